@@ -1,0 +1,1 @@
+"""What an earthquake does to saturated ground."""
