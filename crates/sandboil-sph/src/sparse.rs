@@ -1,0 +1,155 @@
+//! Compressed sparse rows: the one container of every particle operator.
+
+use std::ops::AddAssign;
+
+/// A sparse table in compressed-row form. Columns rise within a row and occur once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Csr<T> {
+    start: Vec<u32>,
+    column: Vec<u32>,
+    value: Vec<T>,
+}
+
+impl<T> Default for Csr<T> {
+    fn default() -> Self {
+        Self {
+            start: vec![0],
+            column: Vec::new(),
+            value: Vec::new(),
+        }
+    }
+}
+
+impl<T: Copy + AddAssign> Csr<T> {
+    /// An empty table with room for `rows` rows.
+    pub fn with_capacity(rows: usize, entries: usize) -> Self {
+        let mut start = Vec::with_capacity(rows + 1);
+        start.push(0);
+        Self {
+            start,
+            column: Vec::with_capacity(entries),
+            value: Vec::with_capacity(entries),
+        }
+    }
+
+    /// Appends a row. Entries of equal column are added together in the order given, which is how images
+    /// fold into the node they mirror. `entries` is left sorted by column.
+    pub fn push_row(&mut self, entries: &mut [(u32, T)]) {
+        // A stable sort keeps the order of equal columns, so the sums are the same on every run.
+        entries.sort_by_key(|&(column, _)| column);
+        for &(column, value) in entries.iter() {
+            let row_is_open = self.column.len() > self.start[self.start.len() - 1] as usize;
+            match self.value.last_mut() {
+                Some(last) if row_is_open && self.column[self.column.len() - 1] == column => {
+                    *last += value
+                }
+                _ => {
+                    self.column.push(column);
+                    self.value.push(value);
+                }
+            }
+        }
+        self.start.push(index(self.column.len()));
+    }
+
+    /// The table with rows and columns exchanged; rows of the result hold their columns in rising order.
+    pub fn transposed(&self, columns: usize) -> Self {
+        let mut start = vec![0_u32; columns + 1];
+        for &column in &self.column {
+            start[column as usize + 1] += 1;
+        }
+        for c in 0..columns {
+            start[c + 1] += start[c];
+        }
+        let mut next = start.clone();
+        let mut row_of = vec![0_u32; self.column.len()];
+        let mut source = vec![0_usize; self.column.len()];
+        for row in 0..self.rows() {
+            for entry in self.span(row) {
+                let slot = &mut next[self.column[entry] as usize];
+                row_of[*slot as usize] = index(row);
+                source[*slot as usize] = entry;
+                *slot += 1;
+            }
+        }
+        let value = source.into_iter().map(|entry| self.value[entry]).collect();
+        Self {
+            start,
+            column: row_of,
+            value,
+        }
+    }
+}
+
+impl<T> Csr<T> {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    /// Number of stored entries.
+    pub fn entries(&self) -> usize {
+        self.column.len()
+    }
+
+    /// Bytes held by the table.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.start.as_slice())
+            + size_of_val(self.column.as_slice())
+            + size_of_val(self.value.as_slice())
+    }
+
+    fn span(&self, row: usize) -> std::ops::Range<usize> {
+        self.start[row] as usize..self.start[row + 1] as usize
+    }
+
+    /// Columns and values of a row.
+    #[inline]
+    pub fn row(&self, row: usize) -> (&[u32], &[T]) {
+        let span = self.span(row);
+        (&self.column[span.clone()], &self.value[span])
+    }
+
+    /// Pairs `(column, value)` of a row.
+    #[inline]
+    pub fn iter_row(&self, row: usize) -> impl Iterator<Item = (usize, &T)> {
+        let (columns, values) = self.row(row);
+        columns.iter().map(|&c| c as usize).zip(values)
+    }
+}
+
+/// Table indices are 32 bit to halve their traffic; a section never holds four thousand million pairs.
+///
+/// # Panics
+/// Never below 2^32 entries: memory ends long before.
+#[allow(clippy::expect_used)] // the bound is a property of the machine, not of the input
+pub(crate) fn index(position: usize) -> u32 {
+    u32::try_from(position).expect("fewer than 2^32 entries")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn equal_columns_of_a_row_are_added_and_rows_stay_apart() {
+        let mut table = Csr::with_capacity(2, 4);
+        table.push_row(&mut [(3, 1.0), (1, 2.0), (3, 4.0)]);
+        table.push_row(&mut [(3, 8.0)]);
+        assert_eq!(table.row(0), (&[1_u32, 3][..], &[2.0, 5.0][..]));
+        assert_eq!(table.row(1), (&[3_u32][..], &[8.0][..]));
+    }
+
+    proptest! {
+        #[test]
+        fn transposing_twice_is_the_identity(rows in prop::collection::vec(prop::collection::btree_map(0_u32..9, -1.0_f64..1.0, 0..6), 0..8)) {
+            let mut table = Csr::with_capacity(rows.len(), 8);
+            for row in &rows {
+                let mut entries: Vec<_> = row.iter().map(|(&c, &v)| (c, v)).collect();
+                table.push_row(&mut entries);
+            }
+            prop_assert_eq!(table.transposed(9).transposed(rows.len()), table);
+        }
+    }
+}
