@@ -1,0 +1,77 @@
+"""The errors a user of sandboil can meet, and the search for the name that was probably meant."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+# Similarity below which a suggestion would rather puzzle than help (difflib ratio, 0 to 1).
+_NEAREST_CUTOFF = 0.5
+
+
+class SandboilError(Exception):
+    """Root of every error that sandboil raises on purpose."""
+
+
+class InvalidInput(SandboilError, ValueError):
+    """Input refused before any work was done.
+
+    Attributes
+    ----------
+    path : where the value stands, for example ``scene.regions[0].porosity``
+    value : the value found there
+    allowed : what would be accepted, for example ``must lie in (0, 1)``
+    hint : nearest right name or how to mend it, or None
+    """
+
+    def __init__(self, path: str, value: object, allowed: str, hint: str | None = None) -> None:
+        super().__init__(path, value, allowed, hint)
+        self.path = path
+        self.value = value
+        self.allowed = allowed
+        self.hint = hint
+
+    def __str__(self) -> str:
+        message = f"{self.path} = {self.value!r}: {self.allowed}"
+        return f"{message}; {self.hint}" if self.hint else message
+
+
+class SimulationDiverged(SandboilError):
+    """A field lost its meaning during a run; what was computed before is kept.
+
+    Attributes
+    ----------
+    quantity : name of the field that is no longer finite or bounded
+    node : index of the first offending node
+    position : its (x, y) in m
+    time : time in the stage, s
+    step : step number in the stage
+    """
+
+    def __init__(
+        self, quantity: str, node: int, position: tuple[float, float], time: float, step: int
+    ) -> None:
+        super().__init__(quantity, node, position, time, step)
+        self.quantity = quantity
+        self.node = node
+        self.position = position
+        self.time = time
+        self.step = step
+
+    def __str__(self) -> str:
+        x, y = self.position
+        return (
+            f"the run diverged: {self.quantity} of node {self.node} at ({x:.6g}, {y:.6g}) m, "
+            f"time {self.time:.6g} s, step {self.step}"
+        )
+
+
+class RunInterrupted(SandboilError):
+    """The user stopped the run; the result file is complete up to the last frame."""
+
+
+def nearest_name(name: str, candidates: Iterable[str]) -> str | None:
+    """The candidate most similar to `name` regardless of case, or None if nothing comes near."""
+    by_lower = {candidate.lower(): candidate for candidate in candidates}
+    found = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=_NEAREST_CUTOFF)
+    return by_lower[found[0]] if found else None

@@ -1,0 +1,181 @@
+"""Base of every scene model: immutable, no unknown keys, and errors told in the scene's own terms."""
+
+from __future__ import annotations
+
+import typing
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from ._errors import InvalidInput, nearest_name
+
+
+def _as_float(value: object) -> float:
+    """Take any real number (numpy's too), but no text and no truth value: those are slips."""
+    if isinstance(value, (bool, str, bytes)) or not hasattr(value, "__float__"):
+        raise ValueError("must be a number")
+    return float(value)
+
+
+Number = Annotated[float, BeforeValidator(_as_float)]
+
+
+class Model(BaseModel):
+    """Frozen model whose arguments may be positional (`_positional`) or carry long names (`_aliases`).
+
+    Every refusal leaves as :class:`InvalidInput`. The path in it starts with `_label`; when the model is
+    a part of another one, that one puts the place where the part stands in its stead.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    _label: ClassVar[str] = "value"
+    _positional: ClassVar[tuple[str, ...]] = ()
+    _aliases: ClassVar[dict[str, str]] = {}
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        if len(args) > len(self._positional):
+            raise InvalidInput(
+                f"{self._label}({type(self).__name__})",
+                args,
+                f"takes {len(self._positional)} positional arguments, {len(args)} were given",
+                f"name the rest: {', '.join(self._keys())}",
+            )
+        for name, value in [
+            *zip(self._positional, args, strict=False),
+            *((short, kwargs.pop(long)) for long, short in self._aliases.items() if long in kwargs),
+        ]:
+            if name in kwargs:
+                raise InvalidInput(
+                    f"{self._label}.{name}", kwargs[name], f"was given twice, also as {value!r}"
+                )
+            kwargs[name] = value
+        try:
+            super().__init__(**kwargs)
+        except ValidationError as error:
+            raise self._invalid_input(error) from None
+
+    @classmethod
+    def _keys(cls) -> list[str]:
+        return [*(name for name in cls.model_fields if name != "kind"), *cls._aliases]
+
+    @classmethod
+    def _invalid_input(cls, error: ValidationError) -> InvalidInput:
+        details = error.errors()
+        # A misspelt key also leaves the right one missing: the misspelling is the thing to tell, and the
+        # missing name the likeliest one meant.
+        missing = [str(detail["loc"][0]) for detail in details if detail["type"] == "missing"]
+        details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
+        return cls._told(details[0], missing)
+
+    @classmethod
+    def _told(cls, detail: ErrorDetails, missing: list[str]) -> InvalidInput:
+        """One pydantic error as path, value, what is allowed, and the nearest name or remedy."""
+        kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
+        cause = context.get("error")
+        # Parts tell their own errors, so past the field's name only list indices say something;
+        # names there are pydantic's labels of union members.
+        location = [str(part) for part in detail["loc"][:1]]
+        path = ".".join([cls._label, *location]) + "".join(
+            f"[{part}]" for part in detail["loc"][1:] if isinstance(part, int)
+        )
+        if isinstance(cause, InvalidInput):
+            rest = cause.path if not location else path + cause.path.lstrip(_NAME_CHARACTERS)
+            return InvalidInput(rest, cause.value, cause.allowed, cause.hint)
+        field = cls.model_fields.get(location[0]) if location else None
+        remedy = _remedy(field)
+        if kind == "extra_forbidden":
+            known = cls._keys()
+            meant = _meant(location[0], missing) or _meant(location[0], known)
+            return InvalidInput(path, value, f"unknown key, known are {', '.join(known)}", meant)
+        if kind == "missing":
+            return InvalidInput(path, None, f"is required{_described(field)}", remedy)
+        if kind == "literal_error":
+            names = _literals(field)
+            return InvalidInput(
+                path, value, f"must be one of {', '.join(map(repr, names))}", _meant(value, names) or remedy
+            )
+        if kind in ("union_tag_invalid", "union_tag_not_found"):
+            names = _tags(field)
+            tag = context.get("tag")
+            key = str(context["discriminator"]).strip("'")
+            if tag is None:
+                return InvalidInput(
+                    path, value, f"needs {key} = one of {', '.join(map(repr, names))}", remedy
+                )
+            return InvalidInput(
+                f"{path}.{key}",
+                tag,
+                f"must be one of {', '.join(map(repr, names))}",
+                _meant(tag, names) or remedy,
+            )
+        if kind == "finite_number":
+            return InvalidInput(path, value, f"must be finite{_described(field)}", remedy)
+        if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
+            return InvalidInput(path, value, _range(field) + _described(field), remedy)
+        allowed = str(cause) if cause is not None else detail["msg"]
+        return InvalidInput(path, value, allowed + _described(field), remedy)
+
+
+_NAME_CHARACTERS = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_"
+
+
+def _meant(name: object, candidates: list[str]) -> str | None:
+    nearest = nearest_name(str(name), candidates)
+    return f"did you mean {nearest!r}?" if nearest else None
+
+
+def _described(field: FieldInfo | None) -> str:
+    return f" ({field.description})" if field is not None and field.description else ""
+
+
+def _remedy(field: FieldInfo | None) -> str | None:
+    extra = field.json_schema_extra if field is not None else None
+    return str(extra["remedy"]) if isinstance(extra, dict) and "remedy" in extra else None
+
+
+def _range(field: FieldInfo | None) -> str:
+    """The whole allowed range in words, so that mending one end does not run into the other."""
+    bounds = _bounds([field.annotation, *field.metadata]) if field is not None else {}
+    below = f"({bounds['gt']:g}" if "gt" in bounds else f"[{bounds['ge']:g}" if "ge" in bounds else None
+    above = f"{bounds['lt']:g})" if "lt" in bounds else f"{bounds['le']:g}]" if "le" in bounds else None
+    if below and above:
+        return f"must lie in {below}, {above}"
+    words = {"gt": "greater than", "ge": "at least", "lt": "less than", "le": "at most"}
+    return "must be " + " and ".join(f"{words[name]} {bound:g}" for name, bound in bounds.items())
+
+
+def _bounds(parts: typing.Iterable[Any]) -> dict[str, float]:
+    """The limits attached to an annotation, wherever in a union they stand."""
+    bounds: dict[str, float] = {}
+    for part in parts:
+        bounds |= {name: getattr(part, name) for name in ("gt", "ge", "lt", "le") if hasattr(part, name)}
+        bounds |= _bounds(getattr(part, "metadata", ()))
+        bounds |= _bounds(typing.get_args(part))
+    return bounds
+
+
+def _union_members(annotation: Any) -> list[Any]:
+    """All plain types inside an annotation, looking through lists, unions and Annotated."""
+    if typing.get_origin(annotation) is Literal:
+        return [annotation]
+    arguments = [part for part in typing.get_args(annotation) if not isinstance(part, FieldInfo)]
+    if not arguments:
+        return [annotation]
+    return [member for part in arguments for member in _union_members(part)]
+
+
+def _literals(field: FieldInfo | None) -> list[str]:
+    members = _union_members(field.annotation) if field is not None else []
+    return [str(name) for m in members if typing.get_origin(m) is Literal for name in typing.get_args(m)]
+
+
+def _tags(field: FieldInfo | None) -> list[str]:
+    members = _union_members(field.annotation) if field is not None else []
+    return [
+        str(m.model_fields["kind"].default)
+        for m in members
+        if isinstance(m, type) and issubclass(m, BaseModel) and "kind" in m.model_fields
+    ]

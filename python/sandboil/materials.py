@@ -1,0 +1,174 @@
+"""Soils: the parameters of the constitutive models, checked and immutable. Stresses in kPa."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+from pydantic import Field, model_validator
+from pydantic.config import JsonDict
+
+from ._errors import InvalidInput
+from ._model import Model, Number
+
+_FRACTION: JsonDict = {"remedy": "it is a fraction, not a percentage: 55 % is written 0.55"}
+_NU: JsonDict = {
+    "remedy": "nu = 0.5 is incompressible; undrained response comes from the pore water: "
+    "keep the drained nu and give the region no hydraulic_conductivity"
+}
+# Largest critical-state friction angle of any sand, degrees; above it the entry is a slip of units.
+_PHI_CV_MAX = 50.0
+
+Positive = Annotated[Number, Field(gt=0.0)]
+NonNegative = Annotated[Number, Field(ge=0.0)]
+
+
+class PM4Sand(Model):
+    """PM4Sand version 3.1, plane strain (Boulanger and Ziotopoulou 2017, UCD/CGM-17/01).
+
+    Three primary parameters; every secondary one left at None takes the model's own default, which may
+    depend on the primary ones and on the stress at initialisation. Long names `relative_density`,
+    `shear_modulus_coefficient` and `contraction_rate` are accepted for `Dr`, `G0` and `hpo`.
+    Raises :class:`InvalidInput`.
+    """
+
+    _label: ClassVar[str] = "material"
+    _positional: ClassVar[tuple[str, ...]] = ("Dr", "G0", "hpo")
+    _aliases: ClassVar[dict[str, str]] = {
+        "relative_density": "Dr",
+        "shear_modulus_coefficient": "G0",
+        "contraction_rate": "hpo",
+    }
+
+    kind: Literal["pm4sand"] = "pm4sand"
+    Dr: Number = Field(gt=0.0, le=1.0, description="relative density, fraction", json_schema_extra=_FRACTION)
+    G0: Number = Field(gt=0.0, description="shear modulus coefficient")
+    hpo: Number = Field(gt=0.0, description="contraction rate")
+    p_atm: Positive | None = Field(None, description="atmospheric pressure, kPa; default 101.3")
+    ho: Positive | None = Field(None, description="ratio of plastic to elastic modulus")
+    e_max: Positive | None = Field(None, description="largest void ratio; default 0.8")
+    e_min: Positive | None = Field(None, description="smallest void ratio; default 0.5")
+    nb: NonNegative | None = Field(None, description="bounding surface exponent; default 0.5")
+    nd: NonNegative | None = Field(None, description="dilatancy surface exponent; default 0.1")
+    Ado: Positive | None = Field(None, description="dilatancy scale")
+    z_max: NonNegative | None = Field(None, description="fabric limit")
+    cz: NonNegative | None = Field(None, description="fabric growth rate; default 250")
+    ce: NonNegative | None = Field(None, description="strain accumulation rate after liquefaction")
+    phi_cv: Annotated[Number, Field(gt=0.0, le=_PHI_CV_MAX)] | None = Field(
+        None, description="critical-state friction angle, degrees; default 33"
+    )
+    nu: Annotated[Number, Field(ge=0.0, lt=0.5)] | None = Field(
+        None, description="Poisson's ratio; default 0.3", json_schema_extra=_NU
+    )
+    C_GD: Annotated[Number, Field(ge=1.0)] | None = Field(
+        None, description="degradation of elastic moduli with fabric; default 2"
+    )
+    C_DR: NonNegative | None = Field(None, description="rotated dilatancy surface")
+    C_kaf: NonNegative | None = Field(None, description="sustained static shear")
+    Q: Positive | None = Field(None, description="Bolton's Q; default 10")
+    R: Positive | None = Field(None, description="Bolton's R; default 1.5")
+    m: Positive | None = Field(None, description="yield surface radius; default 0.01")
+    F_sed_min: Annotated[Number, Field(gt=0.0, le=1.0)] | None = Field(
+        None, description="floor of the post-shaking stiffness factor"
+    )
+    p_sed_o: Positive | None = Field(None, description="post-shaking pressure scale, kPa; default p_atm/5")
+
+    # Void ratio limits when none are given (PM4Sand manual; they only turn void ratio into Dr).
+    DEFAULT_E_MAX: ClassVar[float] = 0.8
+    DEFAULT_E_MIN: ClassVar[float] = 0.5
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, Dr: float = ..., G0: float = ..., hpo: float = ..., **secondary: float | str | None
+        ) -> None: ...
+
+    @model_validator(mode="after")
+    def _void_ratios_ordered(self) -> PM4Sand:
+        e_max, e_min = self.void_ratio_limits
+        if e_max <= e_min:
+            raise InvalidInput(
+                "material.e_max", e_max, f"must be greater than e_min = {e_min:g}", "they may be swapped"
+            )
+        return self
+
+    @property
+    def void_ratio_limits(self) -> tuple[float, float]:
+        """(e_max, e_min) with the defaults filled in."""
+        return (
+            self.DEFAULT_E_MAX if self.e_max is None else self.e_max,
+            self.DEFAULT_E_MIN if self.e_min is None else self.e_min,
+        )
+
+    @property
+    def initial_void_ratio(self) -> float:
+        """Void ratio at zero strain, e_max - (e_max - e_min) Dr."""
+        e_max, e_min = self.void_ratio_limits
+        return e_max - (e_max - e_min) * self.Dr
+
+    def core(self) -> dict[str, float | None]:
+        """Parameters as the numerical core takes them; None asks for the model's default."""
+        return self.model_dump(exclude={"kind"})
+
+
+class Elastic(Model):
+    """Linear isotropic elasticity by G and K, or by E and nu (drained). Moduli in kPa.
+
+    Raises :class:`InvalidInput` unless exactly one pair is given.
+    """
+
+    _label: ClassVar[str] = "material"
+    _positional: ClassVar[tuple[str, ...]] = ("G", "K")
+
+    kind: Literal["elastic"] = "elastic"
+    G: Positive | None = Field(None, description="shear modulus, kPa")
+    K: Positive | None = Field(None, description="bulk modulus, kPa")
+    E: Positive | None = Field(None, description="Young's modulus, kPa")
+    nu: Annotated[Number, Field(ge=0.0, lt=0.5)] | None = Field(
+        None, description="Poisson's ratio", json_schema_extra=_NU
+    )
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            G: float | None = None,
+            K: float | None = None,
+            *,
+            E: float | None = None,
+            nu: float | None = None,
+            kind: str = "elastic",
+        ) -> None: ...
+
+    @model_validator(mode="after")
+    def _one_pair(self) -> Elastic:
+        given = {name for name in ("G", "K", "E", "nu") if getattr(self, name) is not None}
+        if given not in ({"G", "K"}, {"E", "nu"}):
+            raise InvalidInput(
+                "material",
+                {name: getattr(self, name) for name in sorted(given)},
+                "must be given by exactly one pair: G and K, or E and nu",
+            )
+        return self
+
+    @property
+    def shear_modulus(self) -> float:
+        """G in kPa."""
+        if self.E is not None and self.nu is not None:
+            return self.E / (2.0 * (1.0 + self.nu))
+        assert self.G is not None
+        return self.G
+
+    @property
+    def bulk_modulus(self) -> float:
+        """K (three-dimensional) in kPa."""
+        if self.E is not None and self.nu is not None:
+            return self.E / (3.0 * (1.0 - 2.0 * self.nu))
+        assert self.K is not None
+        return self.K
+
+    def core(self) -> dict[str, float | None]:
+        """Moduli as the numerical core takes them."""
+        return {"G": self.shear_modulus, "K": self.bulk_modulus}
+
+
+Material = Annotated[PM4Sand | Elastic, Field(discriminator="kind")]
