@@ -65,7 +65,7 @@ impl NeighbourList {
             cells.visit(query, reach, |slot| {
                 let (source, base_wraps) = cells.member[slot];
                 let delta = cells.wrapped[slot] - query;
-                for wraps in wraps_within(delta, reach, period) {
+                for wraps in wraps_within(delta, reach, period).into_iter().flatten() {
                     pairs.push(Neighbour {
                         source,
                         wraps: base_wraps + wraps,
@@ -115,18 +115,21 @@ impl Neighbour {
 }
 
 /// Wraps (multiples of the period) that bring a source at `delta` from the query inside `reach`.
-fn wraps_within(delta: Vec2, reach: f64, period: Option<Period>) -> std::ops::RangeInclusive<i32> {
-    let half = (reach * reach - delta.y * delta.y).max(-1.0);
-    if half < 0.0 {
-        return 1..=0;
+fn wraps_within(
+    delta: Vec2,
+    reach: f64,
+    period: Option<Period>,
+) -> Option<std::ops::RangeInclusive<i32>> {
+    let half_squared = reach * reach - delta.y * delta.y;
+    if half_squared < 0.0 {
+        return None;
     }
-    let half = half.sqrt();
+    let half = half_squared.sqrt();
     match period {
-        None if delta.x.abs() <= half => 0..=0,
-        None => 1..=0,
-        Some(Period { width }) => {
-            whole(((-half - delta.x) / width).ceil())..=whole(((half - delta.x) / width).floor())
-        }
+        None => (delta.x.abs() <= half).then_some(0..=0),
+        Some(Period { width }) => Some(
+            whole(((-half - delta.x) / width).ceil())..=whole(((half - delta.x) / width).floor()),
+        ),
     }
 }
 
@@ -241,7 +244,7 @@ impl Cells {
                 ),
                 // A period no wider than the search window: every column is in reach.
                 Some(Period { width }) if width <= 2.0 * reach => {
-                    columns(0.0, self.size * self.columns as f64)
+                    columns(0.0, self.size * self.columns as f64);
                 }
                 Some(Period { width }) => {
                     let x = query.x - width * (query.x / width).floor();
