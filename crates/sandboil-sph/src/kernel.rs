@@ -18,10 +18,7 @@ impl WendlandQuintic {
     /// A kernel of smoothing length `h` in metres; `h` must be positive and finite.
     pub fn new(smoothing_length: f64) -> Self {
         debug_assert!(smoothing_length > 0.0 && smoothing_length.is_finite());
-        Self {
-            smoothing_length,
-            normalisation: 7.0 / (4.0 * PI * smoothing_length * smoothing_length),
-        }
+        Self { smoothing_length, normalisation: 7.0 / (4.0 * PI * smoothing_length * smoothing_length) }
     }
 
     /// Smoothing length `h` in metres.
@@ -53,8 +50,7 @@ impl WendlandQuintic {
         }
         // dW/dr = -5 q (1 - q/2)^3 norm/h and grad_i r = -x_ji/r, so the division by r cancels.
         let t = 1.0 - 0.5 * q;
-        let scale =
-            5.0 * self.normalisation * t * t * t / (self.smoothing_length * self.smoothing_length);
+        let scale = 5.0 * self.normalisation * t * t * t / (self.smoothing_length * self.smoothing_length);
         x_ji * scale
     }
 }

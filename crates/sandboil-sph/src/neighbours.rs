@@ -66,10 +66,7 @@ impl NeighbourList {
                 let (source, base_wraps) = cells.member[slot];
                 let delta = cells.wrapped[slot] - query;
                 for wraps in wraps_within(delta, reach, period).into_iter().flatten() {
-                    pairs.push(Neighbour {
-                        source,
-                        wraps: base_wraps + wraps,
-                    });
+                    pairs.push(Neighbour { source, wraps: base_wraps + wraps });
                 }
             });
             pairs[first..].sort_unstable_by_key(|pair| (pair.source, pair.wraps));
@@ -115,11 +112,7 @@ impl Neighbour {
 }
 
 /// Wraps (multiples of the period) that bring a source at `delta` from the query inside `reach`.
-fn wraps_within(
-    delta: Vec2,
-    reach: f64,
-    period: Option<Period>,
-) -> Option<std::ops::RangeInclusive<i32>> {
+fn wraps_within(delta: Vec2, reach: f64, period: Option<Period>) -> Option<std::ops::RangeInclusive<i32>> {
     let half_squared = reach * reach - delta.y * delta.y;
     if half_squared < 0.0 {
         return None;
@@ -127,9 +120,9 @@ fn wraps_within(
     let half = half_squared.sqrt();
     match period {
         None => (delta.x.abs() <= half).then_some(0..=0),
-        Some(Period { width }) => Some(
-            whole(((-half - delta.x) / width).ceil())..=whole(((half - delta.x) / width).floor()),
-        ),
+        Some(Period { width }) => {
+            Some(whole(((-half - delta.x) / width).ceil())..=whole(((half - delta.x) / width).floor()))
+        }
     }
 }
 
@@ -158,10 +151,7 @@ impl Cells {
             None => (position, 0),
             Some(Period { width }) => {
                 let wraps = -whole((position.x / width).floor());
-                (
-                    Vec2::new(position.x + f64::from(wraps) * width, position.y),
-                    wraps,
-                )
+                (Vec2::new(position.x + f64::from(wraps) * width, position.y), wraps)
             }
         };
         let mut low = Vec2::repeat(f64::INFINITY);
@@ -192,10 +182,7 @@ impl Cells {
             member: vec![(0, 0); sources.len()],
             wrapped: vec![Vec2::zeros(); sources.len()],
         };
-        let cell_of: Vec<usize> = home
-            .iter()
-            .map(|(position, _)| cells.cell(*position))
-            .collect();
+        let cell_of: Vec<usize> = home.iter().map(|(position, _)| cells.cell(*position)).collect();
         for &cell in &cell_of {
             cells.start[cell + 1] += 1;
         }
@@ -220,10 +207,7 @@ impl Cells {
 
     /// Calls `visit` with each slot whose cell can hold a source, or an image of one, within `reach`.
     fn visit(&self, query: Vec2, reach: f64, mut visit: impl FnMut(usize)) {
-        let (bottom, top) = (
-            query.y - reach - self.origin.y,
-            query.y + reach - self.origin.y,
-        );
+        let (bottom, top) = (query.y - reach - self.origin.y, query.y + reach - self.origin.y);
         if self.member.is_empty() || top < 0.0 || bottom > self.size * self.rows as f64 {
             return;
         }
@@ -238,10 +222,7 @@ impl Cells {
                 (self.start[first] as usize..self.start[last + 1] as usize).for_each(&mut visit);
             };
             match self.period {
-                None => columns(
-                    query.x - reach - self.origin.x,
-                    query.x + reach - self.origin.x,
-                ),
+                None => columns(query.x - reach - self.origin.x, query.x + reach - self.origin.x),
                 // A period no wider than the search window: every column is in reach.
                 Some(Period { width }) if width <= 2.0 * reach => {
                     columns(0.0, self.size * self.columns as f64);
@@ -249,10 +230,7 @@ impl Cells {
                 Some(Period { width }) => {
                     let x = query.x - width * (query.x / width).floor();
                     for shift in [-width, 0.0, width] {
-                        columns(
-                            x + shift - reach - self.origin.x,
-                            x + shift + reach - self.origin.x,
-                        );
+                        columns(x + shift - reach - self.origin.x, x + shift + reach - self.origin.x);
                     }
                 }
             }
@@ -290,10 +268,7 @@ mod tests {
                 let mut found = Vec::new();
                 for source in 0..sources.len() {
                     for wraps in span.clone() {
-                        let pair = Neighbour {
-                            source: index(source),
-                            wraps,
-                        };
+                        let pair = Neighbour { source: index(source), wraps };
                         if pair.offset(query, sources, period).norm_squared() <= reach * reach {
                             found.push(pair);
                         }
@@ -308,11 +283,7 @@ mod tests {
         points
             .iter()
             .enumerate()
-            .map(|(i, &(x, y))| Source {
-                owner: index(i),
-                position: Vec2::new(x, y),
-                mirrored: false,
-            })
+            .map(|(i, &(x, y))| Source { owner: index(i), position: Vec2::new(x, y), mirrored: false })
             .collect()
     }
 
@@ -351,13 +322,8 @@ mod tests {
     #[test]
     fn a_column_one_particle_wide_meets_all_its_images() {
         let sources = sources(&[(0.1, 0.0)]);
-        let list = NeighbourList::build(
-            &[Vec2::new(0.1, 0.0)],
-            &sources,
-            0.56,
-            0.0,
-            Some(Period { width: 0.2 }),
-        );
+        let list =
+            NeighbourList::build(&[Vec2::new(0.1, 0.0)], &sources, 0.56, 0.0, Some(Period { width: 0.2 }));
         let wraps: Vec<i32> = list.of(0).iter().map(|pair| pair.wraps).collect();
         assert_eq!(wraps, [-2, -1, 0, 1, 2]);
     }

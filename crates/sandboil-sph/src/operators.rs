@@ -97,17 +97,10 @@ impl LeastSquaresFit {
         if members.len() < Self::FEWEST_MEMBERS {
             return Err(OperatorError::Degenerate);
         }
-        let weights: Vec<f64> = members
-            .iter()
-            .map(|m| kernel.value(m.offset.norm()))
-            .collect();
+        let weights: Vec<f64> = members.iter().map(|m| kernel.value(m.offset.norm())).collect();
         let total: f64 = weights.iter().sum();
         let shares: Vec<f64> = weights.iter().map(|w| w / total).collect();
-        let mean: Vec2 = members
-            .iter()
-            .zip(&shares)
-            .map(|(m, share)| m.offset * *share)
-            .sum();
+        let mean: Vec2 = members.iter().zip(&shares).map(|(m, share)| m.offset * *share).sum();
         let covariance: Mat2 = members
             .iter()
             .zip(&shares)
@@ -119,12 +112,7 @@ impl LeastSquaresFit {
             return Err(OperatorError::Degenerate);
         }
         let inverse = covariance.try_inverse().ok_or(OperatorError::Degenerate)?;
-        Ok(Self {
-            mean,
-            covariance,
-            inverse,
-            shares,
-        })
+        Ok(Self { mean, covariance, inverse, shares })
     }
 
     /// Position covariance of the stencil, m2.
@@ -135,10 +123,7 @@ impl LeastSquaresFit {
     /// Gradient weight and share of member `k`.
     pub fn weight(&self, k: usize, member: &Member) -> GradientWeight {
         let share = self.shares[k];
-        GradientWeight {
-            gradient: self.inverse * (member.offset - self.mean) * share,
-            share,
-        }
+        GradientWeight { gradient: self.inverse * (member.offset - self.mean) * share, share }
     }
 
     /// Weight of member `k` in the fitted value at the query point.
@@ -154,19 +139,9 @@ impl LeastSquaresFit {
 ///
 /// # Errors
 /// [`OperatorError::Degenerate`] where the correction matrix cannot be inverted.
-pub fn corrected_gradient(
-    members: &[Member],
-    kernel: WendlandQuintic,
-) -> Result<Vec<Vec2>, OperatorError> {
-    let gradients: Vec<Vec2> = members
-        .iter()
-        .map(|m| kernel.gradient(m.offset) * m.volume)
-        .collect();
-    let moment: Mat2 = members
-        .iter()
-        .zip(&gradients)
-        .map(|(m, g)| g * m.offset.transpose())
-        .sum();
+pub fn corrected_gradient(members: &[Member], kernel: WendlandQuintic) -> Result<Vec<Vec2>, OperatorError> {
+    let gradients: Vec<Vec2> = members.iter().map(|m| kernel.gradient(m.offset) * m.volume).collect();
+    let moment: Mat2 = members.iter().zip(&gradients).map(|(m, g)| g * m.offset.transpose()).sum();
     // Inside a filled domain the moment matrix is near the identity; a lone pair leaves it singular.
     if !(moment.determinant().abs() > LEAST_MOMENT_DETERMINANT) {
         return Err(OperatorError::Degenerate);
@@ -185,11 +160,7 @@ pub fn laplacian_factor(members: &[Member], corrected: &[Vec2]) -> Vec<f64> {
         .zip(corrected)
         .map(|(m, g)| {
             let distance_squared = m.offset.norm_squared();
-            if distance_squared > 0.0 {
-                m.offset.dot(g) / distance_squared
-            } else {
-                0.0
-            }
+            if distance_squared > 0.0 { m.offset.dot(g) / distance_squared } else { 0.0 }
         })
         .collect()
 }
@@ -231,14 +202,8 @@ pub fn consistent_fit(
 ///
 /// # Errors
 /// [`OperatorError::Degenerate`] without any member.
-pub fn interpolation(
-    members: &[Member],
-    kernel: WendlandQuintic,
-) -> Result<Vec<f64>, OperatorError> {
-    let weights: Vec<f64> = members
-        .iter()
-        .map(|m| m.volume * kernel.value(m.offset.norm()))
-        .collect();
+pub fn interpolation(members: &[Member], kernel: WendlandQuintic) -> Result<Vec<f64>, OperatorError> {
+    let weights: Vec<f64> = members.iter().map(|m| m.volume * kernel.value(m.offset.norm())).collect();
     let total: f64 = weights.iter().sum();
     if !(total > 0.0) {
         return Err(OperatorError::Degenerate);
@@ -258,12 +223,7 @@ mod tests {
             let (column, row) = (k % 9, k / 9);
             let offset = Vec2::new(column as f64 - 4.0 + 0.1 * a, row as f64 - 4.0 + 0.1 * b);
             if offset.x >= cut.x && offset.y <= -cut.y && offset.norm() < 2.8 {
-                members.push(Member {
-                    owner: 0,
-                    mirrored: false,
-                    offset,
-                    volume: 1.0,
-                });
+                members.push(Member { owner: 0, mirrored: false, offset, volume: 1.0 });
             }
         }
         members
@@ -301,37 +261,20 @@ mod tests {
         let members = cloud(&[(0.0, 0.0); 81], Vec2::new(-9.0, -9.0));
         let kernel = WendlandQuintic::new(1.4);
         let factor = laplacian_factor(&members, &corrected_gradient(&members, kernel).unwrap());
-        let laplacian: f64 = members
-            .iter()
-            .zip(&factor)
-            .map(|(m, f)| 2.0 * f * m.offset.norm_squared())
-            .sum();
+        let laplacian: f64 =
+            members.iter().zip(&factor).map(|(m, f)| 2.0 * f * m.offset.norm_squared()).sum();
         assert!((laplacian - 4.0).abs() < 1e-12, "{laplacian}");
     }
 
     #[test]
     fn a_line_of_nodes_has_no_gradient() {
         let members: Vec<Member> = (-2..=2)
-            .map(|k| Member {
-                owner: 0,
-                mirrored: false,
-                offset: Vec2::new(f64::from(k), 0.0),
-                volume: 1.0,
-            })
+            .map(|k| Member { owner: 0, mirrored: false, offset: Vec2::new(f64::from(k), 0.0), volume: 1.0 })
             .collect();
         let kernel = WendlandQuintic::new(1.4);
-        assert_eq!(
-            LeastSquaresFit::new(&members, kernel),
-            Err(OperatorError::Degenerate)
-        );
-        assert_eq!(
-            corrected_gradient(&members, kernel),
-            Err(OperatorError::Degenerate)
-        );
-        assert_eq!(
-            consistent_fit(&members, kernel),
-            Err(OperatorError::Degenerate)
-        );
+        assert_eq!(LeastSquaresFit::new(&members, kernel), Err(OperatorError::Degenerate));
+        assert_eq!(corrected_gradient(&members, kernel), Err(OperatorError::Degenerate));
+        assert_eq!(consistent_fit(&members, kernel), Err(OperatorError::Degenerate));
     }
 
     #[test]
@@ -339,9 +282,6 @@ mod tests {
         let members = cloud(&[(0.3, -0.2); 81], Vec2::new(-9.0, -0.4));
         let weights = interpolation(&members, WendlandQuintic::new(1.4)).unwrap();
         assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-14);
-        assert_eq!(
-            interpolation(&[], WendlandQuintic::new(1.4)),
-            Err(OperatorError::Degenerate)
-        );
+        assert_eq!(interpolation(&[], WendlandQuintic::new(1.4)), Err(OperatorError::Degenerate));
     }
 }

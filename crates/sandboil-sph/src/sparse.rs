@@ -12,11 +12,7 @@ pub struct Csr<T> {
 
 impl<T> Default for Csr<T> {
     fn default() -> Self {
-        Self {
-            start: vec![0],
-            column: Vec::new(),
-            value: Vec::new(),
-        }
+        Self { start: vec![0], column: Vec::new(), value: Vec::new() }
     }
 }
 
@@ -25,11 +21,7 @@ impl<T: Copy + AddAssign> Csr<T> {
     pub fn with_capacity(rows: usize, entries: usize) -> Self {
         let mut start = Vec::with_capacity(rows + 1);
         start.push(0);
-        Self {
-            start,
-            column: Vec::with_capacity(entries),
-            value: Vec::with_capacity(entries),
-        }
+        Self { start, column: Vec::with_capacity(entries), value: Vec::with_capacity(entries) }
     }
 
     /// Appends a row. Entries of equal column are added together in the order given, which is how images
@@ -40,9 +32,7 @@ impl<T: Copy + AddAssign> Csr<T> {
         for &(column, value) in entries.iter() {
             let row_is_open = self.column.len() > self.start[self.start.len() - 1] as usize;
             match self.value.last_mut() {
-                Some(last) if row_is_open && self.column[self.column.len() - 1] == column => {
-                    *last += value
-                }
+                Some(last) if row_is_open && self.column[self.column.len() - 1] == column => *last += value,
                 _ => {
                     self.column.push(column);
                     self.value.push(value);
@@ -73,11 +63,7 @@ impl<T: Copy + AddAssign> Csr<T> {
             }
         }
         let value = source.into_iter().map(|entry| self.value[entry]).collect();
-        Self {
-            start,
-            column: row_of,
-            value,
-        }
+        Self { start, column: row_of, value }
     }
 }
 
