@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import typing
+from collections.abc import Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
@@ -19,7 +20,16 @@ def _as_float(value: object) -> float:
     return float(value)
 
 
+def _as_list(value: object) -> object:
+    """Let numpy arrays stand where lists may."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
 Number = Annotated[float, BeforeValidator(_as_float)]
+
+_Item = typing.TypeVar("_Item")
+Many = Annotated[Sequence[_Item], BeforeValidator(_as_list), AfterValidator(tuple)]
+"""Any sequence on entry, a tuple ever after: equal scenes compare equal and cannot be changed."""
 
 
 class Model(BaseModel):
@@ -56,6 +66,9 @@ class Model(BaseModel):
             super().__init__(**kwargs)
         except ValidationError as error:
             raise self._invalid_input(error) from None
+        # The kind is part of what was said even when it was said by the class's name: files need it.
+        if "kind" in type(self).model_fields:
+            self.__pydantic_fields_set__.add("kind")
 
     @classmethod
     def _keys(cls) -> list[str]:
@@ -115,6 +128,11 @@ class Model(BaseModel):
             return InvalidInput(path, value, f"must be finite{_described(field)}", remedy)
         if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
             return InvalidInput(path, value, _range(field) + _described(field), remedy)
+        if kind in ("model_type", "model_attributes_type"):
+            name = context.get("class_name")
+            return InvalidInput(
+                path, value, f"must be {f'a {name}' if name else 'an object of sandboil'} or a table"
+            )
         allowed = str(cause) if cause is not None else detail["msg"]
         return InvalidInput(path, value, allowed + _described(field), remedy)
 

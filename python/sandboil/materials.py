@@ -43,34 +43,36 @@ class PM4Sand(Model):
     Dr: Number = Field(gt=0.0, le=1.0, description="relative density, fraction", json_schema_extra=_FRACTION)
     G0: Number = Field(gt=0.0, description="shear modulus coefficient")
     hpo: Number = Field(gt=0.0, description="contraction rate")
-    p_atm: Positive | None = Field(None, description="atmospheric pressure, kPa; default 101.3")
-    ho: Positive | None = Field(None, description="ratio of plastic to elastic modulus")
-    e_max: Positive | None = Field(None, description="largest void ratio; default 0.8")
-    e_min: Positive | None = Field(None, description="smallest void ratio; default 0.5")
-    nb: NonNegative | None = Field(None, description="bounding surface exponent; default 0.5")
-    nd: NonNegative | None = Field(None, description="dilatancy surface exponent; default 0.1")
-    Ado: Positive | None = Field(None, description="dilatancy scale")
-    z_max: NonNegative | None = Field(None, description="fabric limit")
-    cz: NonNegative | None = Field(None, description="fabric growth rate; default 250")
-    ce: NonNegative | None = Field(None, description="strain accumulation rate after liquefaction")
+    p_atm: Positive | None = Field(default=None, description="atmospheric pressure, kPa; default 101.3")
+    ho: Positive | None = Field(default=None, description="ratio of plastic to elastic modulus")
+    e_max: Positive | None = Field(default=None, description="largest void ratio; default 0.8")
+    e_min: Positive | None = Field(default=None, description="smallest void ratio; default 0.5")
+    nb: NonNegative | None = Field(default=None, description="bounding surface exponent; default 0.5")
+    nd: NonNegative | None = Field(default=None, description="dilatancy surface exponent; default 0.1")
+    Ado: Positive | None = Field(default=None, description="dilatancy scale")
+    z_max: NonNegative | None = Field(default=None, description="fabric limit")
+    cz: NonNegative | None = Field(default=None, description="fabric growth rate; default 250")
+    ce: NonNegative | None = Field(default=None, description="strain accumulation rate after liquefaction")
     phi_cv: Annotated[Number, Field(gt=0.0, le=_PHI_CV_MAX)] | None = Field(
-        None, description="critical-state friction angle, degrees; default 33"
+        default=None, description="critical-state friction angle, degrees; default 33"
     )
     nu: Annotated[Number, Field(ge=0.0, lt=0.5)] | None = Field(
-        None, description="Poisson's ratio; default 0.3", json_schema_extra=_NU
+        default=None, description="Poisson's ratio; default 0.3", json_schema_extra=_NU
     )
     C_GD: Annotated[Number, Field(ge=1.0)] | None = Field(
-        None, description="degradation of elastic moduli with fabric; default 2"
+        default=None, description="degradation of elastic moduli with fabric; default 2"
     )
-    C_DR: NonNegative | None = Field(None, description="rotated dilatancy surface")
-    C_kaf: NonNegative | None = Field(None, description="sustained static shear")
-    Q: Positive | None = Field(None, description="Bolton's Q; default 10")
-    R: Positive | None = Field(None, description="Bolton's R; default 1.5")
-    m: Positive | None = Field(None, description="yield surface radius; default 0.01")
+    C_DR: NonNegative | None = Field(default=None, description="rotated dilatancy surface")
+    C_kaf: NonNegative | None = Field(default=None, description="sustained static shear")
+    Q: Positive | None = Field(default=None, description="Bolton's Q; default 10")
+    R: Positive | None = Field(default=None, description="Bolton's R; default 1.5")
+    m: Positive | None = Field(default=None, description="yield surface radius; default 0.01")
     F_sed_min: Annotated[Number, Field(gt=0.0, le=1.0)] | None = Field(
-        None, description="floor of the post-shaking stiffness factor"
+        default=None, description="floor of the post-shaking stiffness factor"
     )
-    p_sed_o: Positive | None = Field(None, description="post-shaking pressure scale, kPa; default p_atm/5")
+    p_sed_o: Positive | None = Field(
+        default=None, description="post-shaking pressure scale, kPa; default p_atm/5"
+    )
 
     # Void ratio limits when none are given (PM4Sand manual; they only turn void ratio into Dr).
     DEFAULT_E_MAX: ClassVar[float] = 0.8
@@ -120,11 +122,11 @@ class Elastic(Model):
     _positional: ClassVar[tuple[str, ...]] = ("G", "K")
 
     kind: Literal["elastic"] = "elastic"
-    G: Positive | None = Field(None, description="shear modulus, kPa")
-    K: Positive | None = Field(None, description="bulk modulus, kPa")
-    E: Positive | None = Field(None, description="Young's modulus, kPa")
+    G: Positive | None = Field(default=None, description="shear modulus, kPa")
+    K: Positive | None = Field(default=None, description="bulk modulus, kPa")
+    E: Positive | None = Field(default=None, description="Young's modulus, kPa")
     nu: Annotated[Number, Field(ge=0.0, lt=0.5)] | None = Field(
-        None, description="Poisson's ratio", json_schema_extra=_NU
+        default=None, description="Poisson's ratio", json_schema_extra=_NU
     )
 
     if TYPE_CHECKING:

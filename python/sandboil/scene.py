@@ -1,0 +1,861 @@
+"""The scene: what is there, and what is done to it. Units kN, m, s, Mg; x horizontal, y up.
+
+Everything is checked when the scene is made, so that a scene that exists can be computed. What can be said
+in Python can be said in TOML with the same names, where `kind` takes the place of the class.
+"""
+
+from __future__ import annotations
+
+import itertools
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import shapely
+import tomli_w
+from pydantic import BeforeValidator, Field, StrictBool, model_validator
+from shapely.geometry.base import BaseGeometry
+
+from ._errors import InvalidInput
+from ._model import Many, Model, Number
+from .materials import Material, NonNegative, PM4Sand, Positive
+
+if TYPE_CHECKING:
+    from .motion import Motion
+    from .plan import Plan
+
+# Coordinates closer than this are the same point, m: far below any spacing, far above round-off of a
+# kilometre-wide section.
+COORDINATE_TOLERANCE = 1.0e-6
+
+# Density of water where a scene without water gives Gs, Mg/m3: the scenes' usual 10 kN/m3 at 9.81 m/s2.
+REFERENCE_WATER_DENSITY = 10.0 / 9.81
+
+# Relative mismatch up to which densities given twice are the same: they come with three to four digits.
+DENSITY_TOLERANCE = 1.0e-3
+
+# Above this conductivity, m/s, the pore water's acceleration limits the time step and is left out by "auto".
+ACCELERATION_TERM_CONDUCTIVITY = 3.0e-3
+
+Point = tuple[Number, Number]
+Count = Annotated[int, Field(strict=True, ge=1)]
+Poisson = Annotated[Number, Field(ge=0.0, lt=0.5)]
+
+
+class Box(Model):
+    """Rectangle x[0]..x[1] by y[0]..y[1], m."""
+
+    _label: ClassVar[str] = "shape"
+
+    kind: Literal["box"] = "box"
+    x: Point = Field(description="left and right, m")
+    y: Point = Field(description="bottom and top, m")
+
+    @model_validator(mode="after")
+    def _not_empty(self) -> Box:
+        for name, (low, high) in (("x", self.x), ("y", self.y)):
+            if high - low <= COORDINATE_TOLERANCE:
+                raise InvalidInput(
+                    f"shape.{name}",
+                    (low, high),
+                    "must rise, else the region is empty",
+                    "order: low end, high end",
+                )
+        return self
+
+    @property
+    def geometry(self) -> BaseGeometry:
+        """The shape as a shapely polygon."""
+        return shapely.box(self.x[0], self.y[0], self.x[1], self.y[1])
+
+
+class Polygon(Model):
+    """Simple polygon by its corners in order, m; it closes itself."""
+
+    _label: ClassVar[str] = "shape"
+
+    kind: Literal["polygon"] = "polygon"
+    points: Many[Point] = Field(min_length=3, description="corners (x, y) in order, m")
+
+    @model_validator(mode="after")
+    def _simple(self) -> Polygon:
+        geometry = self.geometry
+        if not geometry.is_valid:
+            raise InvalidInput(
+                "shape.points",
+                self.points,
+                f"must form a simple polygon: {shapely.is_valid_reason(geometry)}",
+                "give the corners in order around the region",
+            )
+        if geometry.area <= COORDINATE_TOLERANCE * geometry.length:
+            raise InvalidInput("shape.points", self.points, "must enclose an area, the region is empty")
+        return self
+
+    @property
+    def geometry(self) -> BaseGeometry:
+        """The shape as a shapely polygon."""
+        return shapely.Polygon(self.points)
+
+
+Shape = Annotated[Box | Polygon, Field(discriminator="kind")]
+
+
+def box(x: tuple[float, float], y: tuple[float, float]) -> Box:
+    """Rectangle x[0]..x[1] by y[0]..y[1], m."""
+    return Box(x=x, y=y)
+
+
+def polygon(points: Sequence[tuple[float, float]]) -> Polygon:
+    """Simple polygon by its corners in order, m."""
+    return Polygon(points=points)
+
+
+@dataclass(frozen=True)
+class SoilPhases:
+    """How much solid and water a soil holds. Densities in Mg/m3, per volume of soil save the solid's."""
+
+    porosity: float
+    void_ratio: float
+    Gs: float
+    solid_density: float
+    dry_density: float
+    saturated_density: float
+
+
+class Region(Model):
+    """A part of the section made of one soil.
+
+    Densities: any sufficient set of `Gs`, `porosity` or `void_ratio`, and unit weights in kN/m3. PM4Sand's
+    void ratio comes from its relative density. `bulk_unit_weight` is that of the soil as it stands: saturated
+    in a scene with water, dry in one without. Without `hydraulic_conductivity` (isotropic, m/s) the region is
+    undrained. `K0` is the ratio of horizontal to vertical effective stress that the gravity stage aims at.
+    """
+
+    _label: ClassVar[str] = "region"
+    _positional: ClassVar[tuple[str, ...]] = ("name", "shape", "material")
+
+    name: str = Field(min_length=1)
+    shape: Shape
+    material: Material
+    hydraulic_conductivity: NonNegative | None = Field(
+        default=None, description="isotropic, m/s; none: undrained"
+    )
+    Gs: Annotated[Number, Field(gt=1.0)] | None = Field(
+        default=None, description="specific gravity of the solids"
+    )
+    porosity: Annotated[Number, Field(gt=0.0, lt=1.0)] | None = Field(
+        default=None, description="pores per volume of soil"
+    )
+    void_ratio: Positive | None = Field(default=None, description="pores per volume of solids")
+    dry_unit_weight: Positive | None = Field(default=None, description="kN/m3")
+    bulk_unit_weight: Positive | None = Field(default=None, description="kN/m3")
+    saturated_unit_weight: Positive | None = Field(default=None, description="kN/m3")
+    K0: Number = Field(
+        default=0.5,
+        gt=0.0,
+        lt=1.0,
+        description="horizontal over vertical effective stress",
+        json_schema_extra={
+            "remedy": "gravity acts on an elastic soil with nu = K0/(1 + K0), which must be below 0.5"
+        },
+    )
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            name: str,
+            shape: Box | Polygon,
+            material: Material,
+            *,
+            hydraulic_conductivity: float | None = None,
+            Gs: float | None = None,
+            porosity: float | None = None,
+            void_ratio: float | None = None,
+            dry_unit_weight: float | None = None,
+            bulk_unit_weight: float | None = None,
+            saturated_unit_weight: float | None = None,
+            K0: float = 0.5,
+        ) -> None: ...
+
+    @property
+    def geometry(self) -> BaseGeometry:
+        """The region as a shapely polygon."""
+        return self.shape.geometry
+
+    @property
+    def initial_poisson_ratio(self) -> float:
+        """nu = K0/(1 + K0), with which an elastic level ground comes to rest at K0."""
+        return self.K0 / (1.0 + self.K0)
+
+    def resolved(self, scene: Scene) -> SoilPhases:
+        """Porosity and densities as given; :class:`InvalidInput` if not enough or contradictory."""
+        return self._phases(scene.gravity, scene.water)
+
+    def _phases(self, gravity: float, water: Water | None) -> SoilPhases:
+        rho_w = REFERENCE_WATER_DENSITY if water is None else water.unit_weight / gravity
+        dry = None if self.dry_unit_weight is None else self.dry_unit_weight / gravity
+        saturated = None if self.saturated_unit_weight is None else self.saturated_unit_weight / gravity
+        if self.bulk_unit_weight is not None:
+            bulk = self.bulk_unit_weight / gravity
+            if water is None:
+                dry = self._agreed("bulk_unit_weight", bulk, dry, gravity)
+            else:
+                saturated = self._agreed("bulk_unit_weight", bulk, saturated, gravity)
+        n = self._given_porosity()
+        Gs = self.Gs
+        if n is None:
+            if Gs is not None and dry is not None:
+                n = 1.0 - dry / (Gs * rho_w)
+            elif Gs is not None and saturated is not None:
+                n = (Gs - saturated / rho_w) / (Gs - 1.0)
+            elif dry is not None and saturated is not None:
+                n = (saturated - dry) / rho_w
+            elif dry is not None and water is None:
+                # Nothing flows through a dry soil, so how its volume divides into grains and pores is left
+                # out: all of it counts as solid.
+                return SoilPhases(0.0, 0.0, dry / rho_w, dry, dry, dry)
+            else:
+                raise self._insufficient(water)
+            if not 0.0 < n < 1.0:
+                raise InvalidInput(
+                    "region",
+                    self._given_densities(),
+                    f"these densities give a porosity of {n:.4g}, which must lie in (0, 1)",
+                    f"the density of water is {rho_w:.4g} Mg/m3",
+                )
+        if Gs is None:
+            if dry is not None:
+                Gs = dry / ((1.0 - n) * rho_w)
+            elif saturated is not None:
+                Gs = (saturated / rho_w - n) / (1.0 - n)
+            else:
+                raise self._insufficient(water)
+        phases = SoilPhases(
+            porosity=n,
+            void_ratio=n / (1.0 - n),
+            Gs=Gs,
+            solid_density=Gs * rho_w,
+            dry_density=(1.0 - n) * Gs * rho_w,
+            saturated_density=((1.0 - n) * Gs + n) * rho_w,
+        )
+        self._agreed("dry_unit_weight", dry, phases.dry_density, gravity)
+        self._agreed("saturated_unit_weight", saturated, phases.saturated_density, gravity)
+        return phases
+
+    def _given_porosity(self) -> float | None:
+        """Porosity said directly, by the void ratio or by PM4Sand's relative density; they must agree."""
+        said: list[tuple[str, float, float]] = []
+        if isinstance(self.material, PM4Sand):
+            e = self.material.initial_void_ratio
+            said.append((f"material.Dr = {self.material.Dr:g}", e, e / (1.0 + e)))
+        if self.void_ratio is not None:
+            said.append(("void_ratio", self.void_ratio, self.void_ratio / (1.0 + self.void_ratio)))
+        if self.porosity is not None:
+            said.append(("porosity", self.porosity, self.porosity))
+        for name, value, n in said[1:]:
+            first, _, expected = said[0]
+            if abs(n - expected) > DENSITY_TOLERANCE * expected:
+                right = expected if name == "porosity" else expected / (1.0 - expected)
+                raise InvalidInput(
+                    f"region.{name}",
+                    value,
+                    f"contradicts {first}, which gives {name} = {right:.5g}",
+                    "give only one",
+                )
+        return said[0][2] if said else None
+
+    def _agreed(self, name: str, density: float | None, other: float | None, gravity: float) -> float | None:
+        if density is not None and other is not None and abs(density - other) > DENSITY_TOLERANCE * other:
+            raise InvalidInput(
+                f"region.{name}",
+                density * gravity,
+                f"contradicts the other densities given, which make it {other * gravity:.5g} kN/m3",
+                "give only a sufficient set",
+            )
+        return other if density is None else density
+
+    def _given_densities(self) -> dict[str, float]:
+        names = (
+            "Gs",
+            "porosity",
+            "void_ratio",
+            "dry_unit_weight",
+            "bulk_unit_weight",
+            "saturated_unit_weight",
+        )
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+
+    def _insufficient(self, water: Water | None) -> InvalidInput:
+        return InvalidInput(
+            "region",
+            self._given_densities(),
+            "needs enough densities: two of Gs, porosity (or void_ratio; known for PM4Sand), "
+            "dry_unit_weight, saturated_unit_weight"
+            + (", or a dry_unit_weight alone" if water is None else ""),
+            "for example Gs = 2.65 with porosity = 0.4",
+        )
+
+
+class Water(Model):
+    """Pore water. A scene without it is dry: it has no pore pressure anywhere."""
+
+    _label: ClassVar[str] = "water"
+
+    unit_weight: Number = Field(default=10.0, gt=0.0, description="kN/m3")
+    bulk_modulus: Number = Field(default=1.0e6, gt=0.0, description="kPa")
+
+
+class WaterTable(Model):
+    """Level of still water by elevation or by depth below the highest ground, m; above it, a pond."""
+
+    _label: ClassVar[str] = "water_table"
+
+    elevation: Number | None = Field(default=None, description="m")
+    depth: Number | None = Field(default=None, description="below the highest ground, m")
+
+    @model_validator(mode="after")
+    def _one_level(self) -> WaterTable:
+        if (self.elevation is None) == (self.depth is None):
+            raise InvalidInput(
+                "water_table",
+                {"elevation": self.elevation, "depth": self.depth},
+                "must be given by exactly one of elevation and depth",
+            )
+        return self
+
+
+class Periodic(Model):
+    """What leaves on one side enters on the other: an infinitely wide repetition of the section."""
+
+    _label: ClassVar[str] = "sides"
+
+    kind: Literal["periodic"] = "periodic"
+
+
+class Gravity(Model):
+    """Static stage: self-weight on a fixed base with elastic soils, to rest.
+
+    It ends when the largest acceleration falls below `tolerance` (of gravity). Poisson's ratio is K0/(1 + K0)
+    of each region unless `initial_poisson_ratio` is given for all.
+    """
+
+    _label: ClassVar[str] = "stage"
+
+    kind: Literal["gravity"] = "gravity"
+    tolerance: Number = Field(default=1.0e-4, gt=0.0, lt=1.0, description="largest acceleration over gravity")
+    max_steps: Count = 200_000
+    initial_poisson_ratio: Poisson | None = None
+
+
+class CompliantBase(Model):
+    """Half-space below the section that lets downgoing waves leave.
+
+    Its impedance is that of the soil at the base when the stage begins, unless both are given.
+    """
+
+    _label: ClassVar[str] = "base"
+
+    kind: Literal["compliant"] = "compliant"
+    Vs: Positive | None = Field(default=None, description="shear wave velocity, m/s")
+    density: Positive | None = Field(default=None, description="Mg/m3")
+
+    @model_validator(mode="after")
+    def _both_or_none(self) -> CompliantBase:
+        if (self.Vs is None) != (self.density is None):
+            raise InvalidInput(
+                "base",
+                {"Vs": self.Vs, "density": self.density},
+                "must have both Vs and density, or neither: then the soil at the base gives its own",
+            )
+        return self
+
+
+class MotionSpec(Model):
+    """Where a ground motion comes from, so that a scene can be written down.
+
+    Exactly one source: `file` (PEER .AT2, or a CSV with its `unit` and, if it has several, its `column`),
+    `synthetic` or `ricker` (arguments of the :class:`Motion` constructors of those names), or `dt` with
+    `acceleration_g` or `velocity` (m/s). `scale` multiplies the motion.
+    """
+
+    _label: ClassVar[str] = "motion"
+
+    file: str | None = Field(default=None, description="path, relative to the scene's file")
+    unit: str | None = Field(default=None, description="unit of a CSV's values")
+    column: Annotated[int, Field(strict=True, ge=0)] | str | None = None
+    synthetic: dict[str, int | Number] | None = None
+    ricker: dict[str, int | Number] | None = None
+    dt: Positive | None = Field(default=None, description="time between samples, s")
+    acceleration_g: Many[Number] | None = None
+    velocity: Many[Number] | None = Field(default=None, description="m/s")
+    kind: Literal["outcrop", "within", "upgoing"] = "outcrop"
+    scale: Number | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> MotionSpec:
+        sources = ("file", "synthetic", "ricker", "acceleration_g", "velocity")
+        given = [name for name in sources if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise InvalidInput("motion", given, f"must have exactly one source of {', '.join(sources)}")
+        source = given[0]
+        if (self.dt is not None) != (source in ("acceleration_g", "velocity")):
+            raise InvalidInput("motion.dt", self.dt, "goes with acceleration_g or velocity, and they with it")
+        is_csv = self.file is not None and not self._is_at2
+        if self.unit is None and is_csv:
+            raise InvalidInput("motion.unit", None, "must be given for a CSV", 'for example unit = "g"')
+        for name in ("unit", "column"):
+            if getattr(self, name) is not None and not is_csv:
+                raise InvalidInput(
+                    f"motion.{name}", getattr(self, name), "belongs to a CSV file only", "leave it out"
+                )
+        return self
+
+    @property
+    def _is_at2(self) -> bool:
+        return self.file is not None and Path(self.file).suffix.lower() == ".at2"
+
+    @classmethod
+    def of(cls, motion: Motion) -> MotionSpec:
+        """How to write `motion` down: by its source if it is unchanged since, else by its samples."""
+        if motion.source is not None:
+            return cls(**motion.source)
+        return cls(dt=motion.dt, acceleration_g=motion.acceleration_g, kind=motion.kind)
+
+    def load(self) -> Motion:
+        """The motion itself; :class:`InvalidInput` if its file or its numbers are no motion."""
+        from .motion import Motion
+
+        if self.file is not None and self._is_at2:
+            motion = Motion.from_at2(self.file, kind=self.kind)
+        elif self.file is not None:
+            motion = Motion.from_csv(self.file, unit=self.unit, column=self.column, kind=self.kind)
+        elif self.synthetic is not None:
+            motion = Motion.synthetic(**self.synthetic, kind=self.kind)
+        elif self.ricker is not None:
+            motion = Motion.ricker(**self.ricker, kind=self.kind)
+        else:
+            motion = Motion(
+                dt=self.dt, acceleration_g=self.acceleration_g, velocity=self.velocity, kind=self.kind
+            )
+        return motion if self.scale is None else motion.scaled(factor=self.scale)
+
+
+def _motion_spec(value: object) -> object:
+    if value is None or isinstance(value, (dict, MotionSpec)):
+        return value
+    from .motion import Motion
+
+    return MotionSpec.of(value) if isinstance(value, Motion) else value
+
+
+class Shaking(Model):
+    """Dynamic stage on a compliant base: PM4Sand at work, water flowing.
+
+    Without a motion the ground stands on its dashpots for `duration` seconds. With one, `duration` is that of
+    the motion unless given; a longer one adds quiet time.
+    """
+
+    _label: ClassVar[str] = "stage"
+    _positional: ClassVar[tuple[str, ...]] = ("motion",)
+
+    kind: Literal["shaking"] = "shaking"
+    motion: Annotated[MotionSpec | None, BeforeValidator(_motion_spec)] = None
+    base: CompliantBase = CompliantBase()
+    duration: Positive | None = Field(default=None, description="s")
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            motion: Motion | MotionSpec | None = None,
+            *,
+            base: CompliantBase = ...,
+            duration: float | None = None,
+        ) -> None: ...
+
+    @model_validator(mode="after")
+    def _some_duration(self) -> Shaking:
+        if self.motion is None and self.duration is None:
+            raise InvalidInput("stage.duration", None, "is required when there is no motion", "in seconds")
+        return self
+
+
+Stage = Annotated[Gravity | Shaking, Field(discriminator="kind")]
+
+
+class Output(Model):
+    """What is kept of a run. It never changes the time step.
+
+    Histories are taken at the surface, the base, the `depths` (m below ground, in the mid column) and the
+    `points` (x, y) every `history_dt` s; all fields every `field_dt` s; envelopes see every step.
+    """
+
+    _label: ClassVar[str] = "output"
+
+    depths: Many[Number] = Field(default=(), description="m below the ground surface")
+    points: Many[Point] = Field(default=(), description="(x, y), m")
+    history_dt: Number = Field(default=0.005, gt=0.0, description="s")
+    field_dt: Number = Field(default=0.25, gt=0.0, description="s")
+    envelopes: Many[Literal["r_u", "gamma_max"]] = ("r_u", "gamma_max")
+    stress_paths: StrictBool = Field(
+        default=True, description="shear stress, vertical stress and strain at the depths"
+    )
+
+
+class Numerics(Model):
+    """How it is computed. The defaults are for engineering; the rest is for studies of the method itself.
+
+    `smoothing_ratio` is h/spacing; `velocity_filter` and `local_damping` are fractions; `time_step_factor` is
+    relative to the measured stability limit; beyond `geometry_strain_limit` the particle lists follow the
+    motion.
+    """
+
+    _label: ClassVar[str] = "numerics"
+
+    operators: Literal["conservative", "printed"] = "conservative"
+    smoothing_ratio: Number = Field(default=1.4, ge=1.0, le=3.0, description="h/spacing")
+    velocity_filter: Number = Field(default=0.1, ge=0.0, le=1.0)
+    local_damping: Number = Field(default=0.0, ge=0.0, lt=1.0)
+    time_step_factor: Annotated[Number, Field(gt=0.0, le=2.0)] | None = None
+    integrator: Literal["default", "rk4", "reference"] = "default"
+    integrator_tolerance: Annotated[Number, Field(gt=0.0, le=1.0e-4)] | None = None
+    diffusion: Literal["auto", "implicit", "explicit"] = "auto"
+    acceleration_term: Literal["auto", "on", "off"] = "auto"
+    geometry_strain_limit: Number = Field(default=0.02, ge=0.0)
+    gap_memory: StrictBool = False
+
+
+class Scene(Model):
+    """A vertical section of ground, its water, and the stages it goes through. Immutable and checked."""
+
+    _label: ClassVar[str] = "scene"
+
+    spacing: Number = Field(gt=0.0, description="particle spacing, m")
+    gravity: Number = Field(9.81, gt=0.0, description="m/s2")
+    water: Water | None = None
+    water_table: WaterTable | None = None
+    regions: Many[Region] = Field(min_length=1)
+    sides: Periodic = Periodic()
+    stages: Many[Stage] = Field(min_length=1)
+    output: Output = Output()
+    numerics: Numerics = Numerics()
+
+    # Checks: each refuses the first thing wrong, in the order in which a user would mend them.
+
+    @model_validator(mode="after")
+    def _computable(self) -> Scene:
+        self._check_names()
+        self._check_overlaps()
+        self._check_section()
+        self._check_spacing()
+        self._check_water()
+        self._check_densities()
+        self._check_stages()
+        self._check_output()
+        return self
+
+    def _check_names(self) -> None:
+        names = [region.name for region in self.regions]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise InvalidInput(
+                    f"scene.regions[{i}].name", name, f"is already the name of regions[{names.index(name)}]"
+                )
+
+    def _check_overlaps(self) -> None:
+        shapes = [region.geometry for region in self.regions]
+        for i, shape in enumerate(shapes):
+            for j in range(i):
+                common = shape.intersection(shapes[j])
+                if common.area > COORDINATE_TOLERANCE * shape.length:
+                    x0, y0, x1, y1 = common.bounds
+                    raise InvalidInput(
+                        f"scene.regions[{i}].shape",
+                        self.regions[i].shape,
+                        f"must not overlap region {self.regions[j].name!r}",
+                        f"they share {common.area:.4g} m2 in x {x0:g} to {x1:g}, y {y0:g} to {y1:g}",
+                    )
+
+    def _check_section(self) -> None:
+        section = self.section
+        pieces = list(section.geoms) if section.geom_type != "Polygon" else [section]
+        if len(pieces) > 1:
+            spans = (
+                f"x {x0:g} to {x1:g}, y {y0:g} to {y1:g}" for x0, y0, x1, y1 in (p.bounds for p in pieces)
+            )
+            raise InvalidInput(
+                "scene.regions",
+                [region.name for region in self.regions],
+                "must join into one section without gaps",
+                f"separate pieces: {'; '.join(spans)}",
+            )
+        if holes := list(section.interiors):
+            x0, y0, x1, y1 = holes[0].bounds
+            raise InvalidInput(
+                "scene.regions",
+                [region.name for region in self.regions],
+                "must fill the section without gaps",
+                f"a hole lies in x {x0:g} to {x1:g}, y {y0:g} to {y1:g}",
+            )
+        x0, y0, x1, y1 = self.bounds
+        base = section.intersection(shapely.LineString([(x0, y0), (x1, y0)]))
+        if base.length < x1 - x0 - COORDINATE_TOLERANCE:
+            raise InvalidInput(
+                "scene.regions",
+                [region.name for region in self.regions],
+                f"must stand on a level base: only {base.length:g} m of {x1 - x0:g} m lie at y = {y0:g}",
+            )
+        left, right = (self._side_profile(x) for x in (x0, x1))
+        if not left or left != right:
+            raise InvalidInput(
+                "scene.sides",
+                "periodic",
+                "needs straight vertical sides, the same soils at the same levels on both",
+                f"left: {left or 'no vertical side'}; right: {right or 'no vertical side'}",
+            )
+
+    def _side_profile(self, x: float) -> list[tuple[str, float, float]]:
+        """Soils of a side of the section as (name, bottom, top), lowest first; empty if not straight."""
+        _, y0, _, y1 = self.bounds
+        line = shapely.LineString([(x, y0), (x, y1)])
+        digits = 5  # of the levels in m: one digit coarser than COORDINATE_TOLERANCE
+        touching = [(region.name, region.geometry.intersection(line)) for region in self.regions]
+        pieces = sorted(
+            (round(part.bounds[1], digits), round(part.bounds[3], digits), name)
+            for name, common in touching
+            for part in shapely.get_parts(common)
+            if part.length > COORDINATE_TOLERANCE
+        )
+        levels = [(bottom, top) for bottom, top, _ in pieces]
+        whole = bool(levels) and levels[0][0] == round(y0, digits)
+        whole = whole and all(below[1] == above[0] for below, above in itertools.pairwise(levels))
+        return [(name, bottom, top) for bottom, top, name in pieces] if whole else []
+
+    def _check_spacing(self) -> None:
+        for region in self.regions:
+            x0, y0, x1, y1 = region.geometry.bounds
+            thickness = min(x1 - x0, y1 - y0)
+            if self.spacing > thickness + COORDINATE_TOLERANCE:
+                raise InvalidInput(
+                    "scene.spacing",
+                    self.spacing,
+                    f"must not exceed the least extent of any region, {thickness:g} m ({region.name})",
+                )
+
+    def _check_water(self) -> None:
+        if self.water is None and self.water_table is not None:
+            raise InvalidInput(
+                "scene.water", None, "is required when there is a water table", "water = Water()"
+            )
+        if self.water is not None and self.water_table is None:
+            raise InvalidInput(
+                "scene.water_table",
+                None,
+                "is required when there is water",
+                "WaterTable(depth=0) is at the surface",
+            )
+        level, top = self.water_level, self.bounds[3]
+        if level is not None and level < top - COORDINATE_TOLERANCE:
+            assert self.water_table is not None
+            name = "elevation" if self.water_table.elevation is not None else "depth"
+            raise InvalidInput(
+                f"scene.water_table.{name}",
+                getattr(self.water_table, name),
+                f"must be at the highest ground, elevation {top:g} m, or above",
+                "partly saturated soil is not modelled; leave water and water_table out for a dry section",
+            )
+
+    def _check_densities(self) -> None:
+        for i, region in enumerate(self.regions):
+            try:
+                region.resolved(self)
+            except InvalidInput as error:
+                path = error.path.replace("region", f"scene.regions[{i}]", 1)
+                raise InvalidInput(path, error.value, error.allowed, error.hint) from None
+
+    def _check_stages(self) -> None:
+        if not isinstance(self.stages[0], Gravity):
+            raise InvalidInput(
+                "scene.stages[0].kind",
+                self.stages[0].kind,
+                "must be 'gravity': shaking needs the stresses at rest",
+            )
+        for i, stage in enumerate(self.stages[1:], start=1):
+            if isinstance(stage, Gravity):
+                raise InvalidInput(f"scene.stages[{i}].kind", "gravity", "must be the first stage only")
+
+    def _check_output(self) -> None:
+        _, bottom, _, top = self.bounds
+        for i, depth in enumerate(self.output.depths):
+            if not 0.0 <= depth <= top - bottom:
+                raise InvalidInput(
+                    f"scene.output.depths[{i}]",
+                    depth,
+                    f"must lie in the section, [0, {top - bottom:g}] m",
+                    "depths are positive downwards from the surface",
+                )
+        section = shapely.buffer(self.section, COORDINATE_TOLERANCE)
+        for i, point in enumerate(self.output.points):
+            if not section.covers(shapely.Point(point)):
+                raise InvalidInput(
+                    f"scene.output.points[{i}]", point, f"must lie in the section, bounds {self.bounds}"
+                )
+
+    # What follows from the scene.
+
+    @property
+    def section(self) -> BaseGeometry:
+        """All regions joined, as shapely geometry."""
+        return shapely.union_all([region.geometry for region in self.regions], grid_size=COORDINATE_TOLERANCE)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """(x0, y0, x1, y1) of the section, m."""
+        boxes = shapely.bounds([region.geometry for region in self.regions])
+        (x0, y0), (x1, y1) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+        return float(x0), float(y0), float(x1), float(y1)
+
+    @property
+    def water_level(self) -> float | None:
+        """Elevation of the water table, m; None in a dry scene."""
+        if self.water_table is None:
+            return None
+        if self.water_table.elevation is not None:
+            return self.water_table.elevation
+        assert self.water_table.depth is not None
+        return self.bounds[3] - self.water_table.depth
+
+    @property
+    def stage_names(self) -> list[str]:
+        """One name per stage: its kind, and from the second of a kind on its number: shaking, shaking_2."""
+        kinds = [stage.kind for stage in self.stages]
+        counts = [kinds[: i + 1].count(kind) for i, kind in enumerate(kinds)]
+        return [kind if count == 1 else f"{kind}_{count}" for kind, count in zip(kinds, counts, strict=True)]
+
+    @property
+    def uses_acceleration_term(self) -> bool:
+        """Whether the pore water's acceleration enters the flow (numerics.acceleration_term resolved)."""
+        conductivities = [region.hydraulic_conductivity or 0.0 for region in self.regions]
+        if self.water is None or max(conductivities) == 0.0 or self.numerics.acceleration_term == "off":
+            return False
+        return (
+            self.numerics.acceleration_term == "on" or max(conductivities) <= ACCELERATION_TERM_CONDUCTIVITY
+        )
+
+    def active_physics(self) -> list[tuple[str, bool, str]]:
+        """What this scene computes and what it is spared: (name, active, reason)."""
+        wet = self.water is not None
+        permeable = [region.name for region in self.regions if region.hydraulic_conductivity]
+        sands = [region.name for region in self.regions if isinstance(region.material, PM4Sand)]
+        shaken = any(isinstance(stage, Shaking) for stage in self.stages)
+        flows = wet and bool(permeable)
+        damping = self.numerics.local_damping
+        dry = "the scene has no water"
+        if not flows:
+            acceleration_reason = "no water flows"
+        elif self.numerics.acceleration_term != "auto":
+            acceleration_reason = f"numerics.acceleration_term is {self.numerics.acceleration_term!r}"
+        else:
+            compared = "no region exceeds" if self.uses_acceleration_term else "a region exceeds"
+            acceleration_reason = f"{compared} {ACCELERATION_TERM_CONDUCTIVITY:g} m/s"
+        return [
+            ("pore water", wet, f"water table at elevation {self.water_level:g} m" if wet else dry),
+            (
+                "water diffusion",
+                flows,
+                f"conductivity in {', '.join(permeable)}"
+                if flows
+                else ("no region is permeable" if wet else dry),
+            ),
+            ("water acceleration", self.uses_acceleration_term, acceleration_reason),
+            ("partial saturation", False, "the water table is nowhere below the ground" if wet else dry),
+            ("PM4Sand state", bool(sands), f"in {', '.join(sands)}" if sands else "no PM4Sand region"),
+            ("base dashpots", shaken, "compliant base while shaking" if shaken else "no shaking stage"),
+            ("free-field columns", False, "the sides are periodic"),
+            (
+                "local damping",
+                shaken and damping > 0.0,
+                f"numerics.local_damping is {damping:g}" if shaken else "no shaking stage",
+            ),
+            (
+                "velocity filter",
+                self.numerics.velocity_filter > 0.0,
+                f"numerics.velocity_filter is {self.numerics.velocity_filter:g}",
+            ),
+        ]
+
+    def with_motion(self, motion: Motion | MotionSpec) -> Scene:
+        """The same scene shaken by another motion, in every stage that has one."""
+        spec = motion if isinstance(motion, MotionSpec) else MotionSpec.of(motion)
+        shaken = [isinstance(stage, Shaking) and stage.motion is not None for stage in self.stages]
+        if not any(shaken):
+            raise InvalidInput(
+                "scene.stages",
+                self.stage_names,
+                "must hold a shaking stage with a motion for another to replace it",
+            )
+        stages = tuple(
+            stage.model_copy(update={"motion": spec}) if has_motion else stage
+            for stage, has_motion in zip(self.stages, shaken, strict=True)
+        )
+        return self.model_copy(update={"stages": stages})
+
+    def plan(self) -> Plan:
+        """What would be computed and what it would cost."""
+        from .plan import plan
+
+        return plan(self)
+
+    # Files.
+
+    def to_toml(self, path: str | Path | None = None, *, resolved: bool = False) -> str:
+        """The scene as TOML text, also written to `path` if given.
+
+        It holds what was said; `resolved=True` adds every default, so that the text keeps its meaning when
+        defaults change. Either way :meth:`from_toml` gives an equal scene.
+        """
+        said: dict[str, Any] = self.model_dump(exclude_none=True, exclude_unset=not resolved)
+        text = tomli_w.dumps(said)
+        if path is not None:
+            try:
+                Path(path).write_text(text, encoding="utf-8")
+            except OSError as error:
+                raise InvalidInput("path", str(path), f"must be writable: {error.strerror}") from error
+        return text
+
+    @classmethod
+    def from_toml(cls, path_or_text: str | Path) -> Scene:
+        """Scene from a TOML file, or from TOML text (recognised by its line breaks).
+
+        Motion files named in it are taken relative to the scene's file. Raises :class:`InvalidInput`.
+        """
+        if isinstance(path_or_text, str) and "\n" in path_or_text:
+            return cls._from_text(path_or_text, "text", Path())
+        path = Path(path_or_text)
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+            raise InvalidInput("scene", str(path), f"must be a readable TOML file: {reason}") from error
+        return cls._from_text(text, str(path), path.parent)
+
+    @classmethod
+    def _from_text(cls, text: str, origin: str, folder: Path) -> Scene:
+        try:
+            said = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise InvalidInput("scene", origin, f"must be TOML: {error}") from error
+        scene = cls(**said)
+        stages = tuple(_anchored(stage, folder) for stage in scene.stages)
+        return scene.model_copy(update={"stages": stages})
+
+
+def _anchored(stage: Gravity | Shaking, folder: Path) -> Gravity | Shaking:
+    """The stage with its motion's file found from `folder`."""
+    if not isinstance(stage, Shaking) or stage.motion is None or stage.motion.file is None:
+        return stage
+    motion = stage.motion.model_copy(update={"file": str(folder.absolute() / stage.motion.file)})
+    return stage.model_copy(update={"motion": motion})
