@@ -62,6 +62,8 @@ class Overburden:
         lines, column = self._verticals(x)
         for outline, unit_weight in zip(self.outlines, self.unit_weights, strict=True):
             parts, line = shapely.get_parts(shapely.intersection(lines, outline), return_index=True)
+            crossed = ~shapely.is_empty(parts)
+            parts, line = parts[crossed], line[crossed]
             extents = shapely.bounds(parts)
             # A line crosses most regions once; the n-th crossing of every line is added in one go.
             order = np.arange(len(line)) - np.searchsorted(line, line)
@@ -83,6 +85,13 @@ class Overburden:
         """
         x0, y0, x1, y1 = self.bounds
         inside = np.where((x < x0) | (x > x1), x0 + np.mod(x - x0, x1 - x0), x)
+        # A vertical along an upright edge would count the soils on both of its sides: it is moved off it,
+        # to the right, or from the right side of the section to the left.
+        corners = np.unique(shapely.get_coordinates(self.outlines)[:, 0])
+        near = corners[np.minimum(np.searchsorted(corners, inside - COORDINATE_TOLERANCE), len(corners) - 1)]
+        on_edge = np.abs(near - inside) <= COORDINATE_TOLERANCE
+        aside = np.where(near < x1, near + 2.0 * COORDINATE_TOLERANCE, near - 2.0 * COORDINATE_TOLERANCE)
+        inside = np.where(on_edge, aside, inside)
         distinct, column = np.unique(inside, return_inverse=True)
         ends = np.empty((len(distinct), 2, 2))
         ends[:, :, 0] = distinct[:, None]

@@ -6,6 +6,7 @@ in Python can be said in TOML with the same names, where `kind` takes the place 
 
 from __future__ import annotations
 
+import inspect
 import itertools
 import tomllib
 from collections.abc import Sequence
@@ -15,10 +16,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import shapely
 import tomli_w
-from pydantic import BeforeValidator, Field, StrictBool, model_validator
+from pydantic import BeforeValidator, Field, StrictBool, ValidationInfo, field_validator, model_validator
 from shapely.geometry.base import BaseGeometry
 
-from ._errors import InvalidInput
+from ._errors import InvalidInput, nearest_name
 from ._model import Many, Model, Number
 from .materials import Material, NonNegative, PM4Sand, Positive
 
@@ -376,7 +377,7 @@ class CompliantBase(Model):
 class MotionSpec(Model):
     """Where a ground motion comes from, so that a scene can be written down.
 
-    Exactly one source: `file` (PEER .AT2, or a CSV with its `unit` and, if it has several, its `column`),
+    Exactly one source: `file` (PEER .AT2, or a CSV with its `unit` and `column` unless its header tells),
     `synthetic` or `ricker` (arguments of the :class:`Motion` constructors of those names), or `dt` with
     `acceleration_g` or `velocity` (m/s). `scale` multiplies the motion.
     """
@@ -394,6 +395,33 @@ class MotionSpec(Model):
     kind: Literal["outcrop", "within", "upgoing"] = "outcrop"
     scale: Number | None = None
 
+    @field_validator("synthetic", "ricker")
+    @classmethod
+    def _complete(cls, said: dict[str, float] | None, field: ValidationInfo) -> dict[str, float] | None:
+        """Check the generator's arguments and write its defaults out: the scene then keeps its meaning."""
+        if said is None:
+            return None
+        from .motion import Motion
+
+        generator = str(field.field_name)
+        known = dict(inspect.signature(getattr(Motion, generator)).parameters)
+        known.pop("kind", None)
+        for name, value in said.items():
+            if name not in known:
+                meant = nearest_name(name, known)
+                raise InvalidInput(
+                    f"{generator}.{name}",
+                    value,
+                    f"unknown key, known are {', '.join(known)}",
+                    f"did you mean {meant!r}?" if meant else None,
+                )
+        for name, parameter in known.items():
+            if parameter.default is inspect.Parameter.empty and name not in said:
+                raise InvalidInput(f"{generator}.{name}", None, "is required")
+        defaults = {name: parameter.default for name, parameter in known.items()}
+        complete = defaults | said
+        return {name: complete[name] for name in known if complete[name] is not None}
+
     @model_validator(mode="after")
     def _one_source(self) -> MotionSpec:
         sources = ("file", "synthetic", "ricker", "acceleration_g", "velocity")
@@ -403,35 +431,26 @@ class MotionSpec(Model):
         source = given[0]
         if (self.dt is not None) != (source in ("acceleration_g", "velocity")):
             raise InvalidInput("motion.dt", self.dt, "goes with acceleration_g or velocity, and they with it")
-        is_csv = self.file is not None and not self._is_at2
-        if self.unit is None and is_csv:
-            raise InvalidInput("motion.unit", None, "must be given for a CSV", 'for example unit = "g"')
-        for name in ("unit", "column"):
-            if getattr(self, name) is not None and not is_csv:
-                raise InvalidInput(
-                    f"motion.{name}", getattr(self, name), "belongs to a CSV file only", "leave it out"
-                )
         return self
-
-    @property
-    def _is_at2(self) -> bool:
-        return self.file is not None and Path(self.file).suffix.lower() == ".at2"
 
     @classmethod
     def of(cls, motion: Motion) -> MotionSpec:
         """How to write `motion` down: by its source if it is unchanged since, else by its samples."""
-        if motion.source is not None:
-            return cls(**motion.source)
-        return cls(dt=motion.dt, acceleration_g=motion.acceleration_g, kind=motion.kind)
+        if motion.source is None:
+            samples = motion.acceleration_g if motion.quantity == "acceleration_g" else motion.velocity
+            return cls(dt=motion.dt, kind=motion.kind, **{motion.quantity: samples})
+        source = dict(motion.source)
+        if "file" in source:
+            # Said relative to the working folder; a scene's file may be written anywhere.
+            source["file"] = str(Path(source["file"]).absolute())
+        return cls(**source)
 
     def load(self) -> Motion:
         """The motion itself; :class:`InvalidInput` if its file or its numbers are no motion."""
         from .motion import Motion
 
-        if self.file is not None and self._is_at2:
-            motion = Motion.from_at2(self.file, kind=self.kind)
-        elif self.file is not None:
-            motion = Motion.from_csv(self.file, unit=self.unit, column=self.column, kind=self.kind)
+        if self.file is not None:
+            motion = Motion.from_file(self.file, unit=self.unit, column=self.column, kind=self.kind)
         elif self.synthetic is not None:
             motion = Motion.synthetic(**self.synthetic, kind=self.kind)
         elif self.ricker is not None:
@@ -622,7 +641,7 @@ class Scene(Model):
         _, y0, _, y1 = self.bounds
         line = shapely.LineString([(x, y0), (x, y1)])
         digits = 5  # of the levels in m: one digit coarser than COORDINATE_TOLERANCE
-        touching = [(region.name, region.geometry.intersection(line)) for region in self.regions]
+        touching = [(self._soil_name(region), region.geometry.intersection(line)) for region in self.regions]
         pieces = sorted(
             (round(part.bounds[1], digits), round(part.bounds[3], digits), name)
             for name, common in touching
@@ -633,6 +652,11 @@ class Scene(Model):
         whole = bool(levels) and levels[0][0] == round(y0, digits)
         whole = whole and all(below[1] == above[0] for below, above in itertools.pairwise(levels))
         return [(name, bottom, top) for bottom, top, name in pieces] if whole else []
+
+    def _soil_name(self, region: Region) -> str:
+        """Name of the first region of the same soil: regions that differ only in name and place are alike."""
+        soils = [other.model_dump(exclude={"name", "shape"}) for other in self.regions]
+        return self.regions[soils.index(region.model_dump(exclude={"name", "shape"}))].name
 
     def _check_spacing(self) -> None:
         for region in self.regions:
