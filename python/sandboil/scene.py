@@ -437,8 +437,8 @@ class MotionSpec(Model):
     def of(cls, motion: Motion) -> MotionSpec:
         """How to write `motion` down: by its source if it is unchanged since, else by its samples."""
         if motion.source is None:
-            samples = motion.acceleration_g if motion.quantity == "acceleration_g" else motion.velocity
-            return cls(dt=motion.dt, kind=motion.kind, **{motion.quantity: samples})
+            samples: dict[str, Any] = {motion.quantity: getattr(motion, motion.quantity)}
+            return cls(dt=motion.dt, kind=motion.kind, **samples)
         source = dict(motion.source)
         if "file" in source:
             # Said relative to the working folder; a scene's file may be written anywhere.
@@ -452,13 +452,12 @@ class MotionSpec(Model):
         if self.file is not None:
             motion = Motion.from_file(self.file, unit=self.unit, column=self.column, kind=self.kind)
         elif self.synthetic is not None:
-            motion = Motion.synthetic(**self.synthetic, kind=self.kind)
+            motion = Motion.synthetic(**dict[str, Any](self.synthetic), kind=self.kind)
         elif self.ricker is not None:
-            motion = Motion.ricker(**self.ricker, kind=self.kind)
+            motion = Motion.ricker(**dict[str, Any](self.ricker), kind=self.kind)
         else:
-            motion = Motion(
-                dt=self.dt, acceleration_g=self.acceleration_g, velocity=self.velocity, kind=self.kind
-            )
+            samples: dict[str, Any] = self.model_dump(include={"dt", "acceleration_g", "velocity", "kind"})
+            motion = Motion(**samples)
         return motion if self.scale is None else motion.scaled(factor=self.scale)
 
 
