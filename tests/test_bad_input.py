@@ -423,6 +423,13 @@ CASES: dict[str, tuple[Change, str, object, str, str | None]] = {
         "goes with acceleration_g or velocity",
         None,
     ),
+    "dt beside a file": (
+        setting("stages.1.motion", {"file": "a.AT2", "dt": 0.01}),
+        "scene.stages[1].motion.dt",
+        0.01,
+        "goes with acceleration_g or velocity",
+        None,
+    ),
     "misspelt argument of a generator": (
         setting("stages.1.motion", {"synthetic": {"pga": 0.3}}),
         "scene.stages[1].motion.synthetic.pga",
