@@ -227,7 +227,7 @@ class Motion:
         """Seeded synthetic earthquake, by default like Loma Prieta 1989, Gilroy Array #1, component 090.
 
         White noise in a Saragoni-Hart envelope, through the Kanai-Tajimi ground with the Clough-Penzien
-        high-pass (0.25 Hz) and f_max 25 Hz, baseline corrected and scaled. The same arguments give the
+        high-pass (0.5 Hz) and f_max 25 Hz, baseline corrected and scaled. The same arguments give the
         same motion.
 
         Parameters
@@ -243,8 +243,12 @@ class Motion:
             0.307 of `duration`, the record's 3.68 s for 12 s
         """
         samples = _generators.synthetic(pga_g, duration, seed, dt, pgv, ground_frequency, d5_95)
-        given = _given(pgv=pgv, ground_frequency=ground_frequency, d5_95=d5_95)
-        given = {"pga_g": pga_g, "duration": duration, "seed": seed, "dt": dt, **given}
+        given = {
+            "seed": int(seed),
+            **_given(
+                pga_g=pga_g, duration=duration, dt=dt, pgv=pgv, ground_frequency=ground_frequency, d5_95=d5_95
+            ),
+        }
         return cls._made({"synthetic": given}, kind, dt=dt, acceleration_g=samples)
 
     # Series
@@ -406,7 +410,7 @@ def _read_only(series: Array) -> Array:
 
 
 def _given(**arguments: float | None) -> dict[str, float]:
-    return {name: value for name, value in arguments.items() if value is not None}
+    return {name: float(value) for name, value in arguments.items() if value is not None}
 
 
 def _kind(kind: str) -> Kind:

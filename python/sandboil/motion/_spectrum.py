@@ -51,7 +51,7 @@ def response_spectrum(
 
     Duhamel's integral is summed exactly for the acceleration straight between samples (the solution of
     Nigam and Jennings 1969, in its complex form). Short periods are looked at between the samples too, and
-    the free vibration in the period that follows the record counts.
+    the free vibration after the record counts.
 
     Parameters
     ----------
@@ -89,17 +89,20 @@ def _pseudo_acceleration(ground: Array, dt: float, period: float, damping: float
     if substeps > 1:
         fine = np.arange((ground.size - 1) * substeps + 1) / substeps
         ground = np.interp(fine, np.arange(ground.size), ground)
-    after = min(math.ceil(period / step), ground.size)
-    ground = np.concatenate([ground, np.zeros(after + 1)])
+    ground = np.append(ground, 0.0)
 
     omega = 2.0 * math.pi / period
     damped = math.sqrt(1.0 - damping**2)
-    mu = omega * step * complex(-damping, damped)
+    root = complex(-damping, damped)
+    mu = omega * step * root
     late = _phi2(mu)
     early = (np.exp(mu) - 1.0) / mu - late
     forcing = -step * (early * ground[:-1] + late * ground[1:])
     response = lfilter([1.0], [1.0, -np.exp(mu)], forcing)
-    return float(omega / damped * np.max(np.abs(response.imag)))
+    # The free vibration y exp(lambda t) is greatest where Im(lambda y exp(lambda t)), its rate, is first 0.
+    to_peak = -np.angle(root * response[-1]) % math.pi
+    free = response[-1] * np.exp(root / damped * to_peak)
+    return float(omega / damped * max(np.max(np.abs(response.imag)), abs(free.imag)))
 
 
 def _phi2(mu: complex) -> complex:
