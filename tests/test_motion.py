@@ -447,7 +447,7 @@ def test_filter_sees_rest_around_the_record() -> None:
 
 
 def test_upgoing_wave_is_half_an_outcrop_motion() -> None:
-    t = {"acceleration_g": sine().acceleration_g, "dt": 0.001}
+    t: dict[str, Any] = {"acceleration_g": sine().acceleration_g, "dt": 0.001}
     dt, half = Motion(**t).upgoing_velocity()
     assert dt == 0.001
     np.testing.assert_array_equal(half, 0.5 * sine().velocity)
