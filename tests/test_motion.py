@@ -312,7 +312,7 @@ BAD_ARGUMENTS: dict[str, tuple[Callable[[], object], list[str]]] = {
     ),
     "nan": (lambda: Motion(dt=0.01, acceleration_g=[0.0, math.nan]), ["motion.acceleration_g[1] = nan"]),
     "table": (lambda: Motion(dt=0.01, acceleration_g=[[0.0], [1.0]]), ["one-dimensional"]),
-    "words": (lambda: Motion(dt=0.01, acceleration_g=["a", "b"]), ["array of numbers"]),  # type: ignore[list-item]
+    "words": (lambda: Motion(dt=0.01, acceleration_g=["a", "b"]), ["array of numbers"]),
     "over 20 g": (lambda: Motion(dt=0.01, acceleration_g=[0.0, -21.0]), ["[1] = -21.0", "20 g", "unit"]),
     "over 20 m/s": (lambda: Motion(dt=9.0, velocity=[0.0, 21.0]), ["motion.velocity[1] = 21.0", "cm/s"]),
     "steep velocity": (
