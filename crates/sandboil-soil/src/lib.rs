@@ -1,1 +1,44 @@
-//! Placeholder replaced in the first slice.
+//! Constitutive models as pure functions: (parameters, state, strain increment, rotation) -> (state, report).
+//!
+//! This crate knows no particle, no time and no file. Units: kPa for stress, strains are plain numbers.
+//! At this border stress and strain are tension positive; stress is effective.
+
+pub mod elastic;
+mod error;
+mod integrator;
+pub mod pm4sand;
+mod report;
+mod tensor;
+
+pub use error::SoilError;
+pub use integrator::Integrator;
+pub use report::UpdateReport;
+pub use tensor::{Deviator, StrainIncrement, Stress};
+
+/// Current elastic moduli of a material, kPa.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moduli {
+    /// Bulk modulus K (three-dimensional), kPa.
+    pub bulk: f64,
+    /// Shear modulus G, kPa.
+    pub shear: f64,
+}
+
+impl Moduli {
+    /// Change of the in-plane mean stress `(xx + yy)/2` per volumetric strain in plane strain, `K + G/3`, kPa.
+    #[inline]
+    pub fn mean_stress_stiffness(&self) -> f64 {
+        self.bulk + self.shear / 3.0
+    }
+
+    /// Both moduli from the shear modulus and the ratio K/G.
+    #[inline]
+    pub fn from_shear(shear: f64, bulk_to_shear: f64) -> Self {
+        Self { bulk: bulk_to_shear * shear, shear }
+    }
+}
+
+/// K/G of an isotropic material with Poisson's ratio `nu`.
+pub(crate) fn bulk_to_shear(nu: f64) -> f64 {
+    2.0 / 3.0 * (1.0 + nu) / (1.0 - 2.0 * nu)
+}

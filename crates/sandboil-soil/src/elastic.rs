@@ -1,0 +1,132 @@
+//! Linear isotropic elasticity in plane strain, with the Jaumann rate of stress.
+
+use crate::{Moduli, SoilError, StrainIncrement, Stress, bulk_to_shear, error::finite, tensor::Deviator};
+
+/// Linear isotropic elastic material.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Elastic {
+    moduli: Moduli,
+}
+
+fn positive(name: &'static str, value: f64) -> Result<f64, SoilError> {
+    if value > 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(SoilError::InvalidParameter { name, value, expected: "positive and finite" })
+    }
+}
+
+impl Elastic {
+    /// Material with shear modulus `shear` and three-dimensional bulk modulus `bulk`, kPa, both positive.
+    pub fn new(shear: f64, bulk: f64) -> Result<Self, SoilError> {
+        Ok(Self { moduli: Moduli { bulk: positive("K", bulk)?, shear: positive("G", shear)? } })
+    }
+
+    /// Material with shear modulus `shear`, kPa, and Poisson's ratio in (-1, 0.5).
+    pub fn from_poisson(shear: f64, nu: f64) -> Result<Self, SoilError> {
+        finite("nu", nu)?;
+        if !(nu > -1.0 && nu < 0.5) {
+            return Err(SoilError::InvalidParameter { name: "nu", value: nu, expected: "in (-1, 0.5)" });
+        }
+        Self::new(shear, bulk_to_shear(nu) * shear)
+    }
+
+    /// Bulk and shear modulus, kPa.
+    pub fn moduli(&self) -> Moduli {
+        self.moduli
+    }
+
+    /// Stress, kPa, after a strain increment: the old stress turned with the material, plus `C de`.
+    ///
+    /// The rotation is the Cayley form of Hughes and Winget (1980): a rotation for any spin, so invariants are
+    /// kept to round-off, and the Jaumann rate in the limit.
+    #[inline]
+    pub fn update(&self, stress: &Stress, de: &StrainIncrement) -> Stress {
+        let Moduli { bulk, shear } = self.moduli;
+        let volume = de.xx + de.yy;
+        let mean = 0.5 * (stress.xx + stress.yy) + self.moduli.mean_stress_stiffness() * volume;
+        let deviator = Deviator { half_difference: 0.5 * (stress.xx - stress.yy), xy: stress.xy };
+        let strain = Deviator { half_difference: 0.5 * (de.xx - de.yy), xy: 0.5 * de.xy };
+        // A clockwise turn of the material by `spin` is a view from axes turned counter-clockwise by it.
+        let deviator = deviator.in_axes_turned(cayley(de.spin)) + strain * (2.0 * shear);
+        Stress {
+            xx: mean + deviator.half_difference,
+            yy: mean - deviator.half_difference,
+            xy: deviator.xy,
+            zz: stress.zz + (bulk - 2.0 / 3.0 * shear) * volume,
+        }
+    }
+}
+
+/// Cosine and sine of twice the angle `2 atan(spin/2)`, which is `spin` to second order.
+#[inline]
+fn cayley(spin: f64) -> (f64, f64) {
+    let scale = 1.0 / (1.0 + 0.25 * spin * spin);
+    let cos = scale * (1.0 - 0.25 * spin * spin);
+    let sin = scale * spin;
+    (cos * cos - sin * sin, 2.0 * sin * cos)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rock() -> Elastic {
+        Elastic::new(1.0e5, 3.0e5).unwrap()
+    }
+
+    #[test]
+    fn one_dimensional_compression_is_stiff_by_k_plus_four_thirds_g() {
+        let stress =
+            rock().update(&Stress::default(), &StrainIncrement { yy: -1e-4, ..StrainIncrement::default() });
+        assert!((stress.yy + (3.0e5 + 4.0 / 3.0 * 1.0e5) * 1e-4).abs() < 1e-9);
+        assert!((stress.xx + (3.0e5 - 2.0 / 3.0 * 1.0e5) * 1e-4).abs() < 1e-9);
+        assert!((stress.zz - stress.xx).abs() < 1e-12);
+    }
+
+    #[test]
+    fn poisson_ratio_gives_the_earth_pressure_coefficient() {
+        let soil = Elastic::from_poisson(5.0e4, 1.0 / 3.0).unwrap();
+        let stress =
+            soil.update(&Stress::default(), &StrainIncrement { yy: -1e-4, ..StrainIncrement::default() });
+        assert!((stress.xx / stress.yy - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn shear_strain_is_engineering() {
+        let stress =
+            rock().update(&Stress::default(), &StrainIncrement { xy: 1e-4, ..StrainIncrement::default() });
+        assert!((stress.xy - 10.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_quarter_turn_in_small_steps_exchanges_the_axes() {
+        let start = Stress { xx: -50.0, yy: -100.0, xy: 7.0, zz: -50.0 };
+        let steps = 1000;
+        let spin = std::f64::consts::FRAC_PI_2 / f64::from(steps);
+        let mut stress = start;
+        for _ in 0..steps {
+            stress = rock().update(&stress, &StrainIncrement { spin, ..StrainIncrement::default() });
+        }
+        assert!((stress.xx - start.yy).abs() < 1e-3 && (stress.yy - start.xx).abs() < 1e-3);
+        assert!((stress.xy + start.xy).abs() < 1e-3);
+    }
+
+    #[test]
+    fn spin_follows_the_jaumann_rate() {
+        let start = Stress { xx: -50.0, yy: -100.0, xy: 7.0, zz: -50.0 };
+        let w = 1e-6;
+        let turned = rock().update(&start, &StrainIncrement { spin: w, ..StrainIncrement::default() });
+        assert!((turned.xx - start.xx - 2.0 * w * start.xy).abs() < 1e-9);
+        assert!((turned.yy - start.yy + 2.0 * w * start.xy).abs() < 1e-9);
+        assert!((turned.xy - start.xy - w * (start.yy - start.xx)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn impossible_constants_are_refused() {
+        assert!(Elastic::new(0.0, 1.0).is_err());
+        assert!(Elastic::new(1.0, f64::NAN).is_err());
+        assert!(Elastic::from_poisson(1.0, 0.5).is_err());
+        assert!(Elastic::from_poisson(1.0, f64::NAN).is_err());
+    }
+}

@@ -1,0 +1,36 @@
+/// What a constitutive model refuses or cannot do.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SoilError {
+    /// A parameter outside its range; refused before any work.
+    #[error("{name} = {value}: must be {expected}")]
+    InvalidParameter {
+        /// Name of the parameter.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+        /// What is allowed.
+        expected: &'static str,
+    },
+    /// An input or a result that is not a finite number. The state is left unchanged.
+    #[error("{quantity} is {value}, not a finite number")]
+    NonFinite {
+        /// The offending quantity.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A strain increment so large that no path through it means anything. The state is left unchanged.
+    #[error("strain increment {value}: one increment may change a component by at most {limit}")]
+    StrainIncrementTooLarge {
+        /// Largest component, absolute.
+        value: f64,
+        /// Largest one accepted.
+        limit: f64,
+    },
+}
+
+/// Refuses a number that is infinite or not a number.
+pub(crate) fn finite(quantity: &'static str, value: f64) -> Result<f64, SoilError> {
+    if value.is_finite() { Ok(value) } else { Err(SoilError::NonFinite { quantity, value }) }
+}

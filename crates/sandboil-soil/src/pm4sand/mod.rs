@@ -1,0 +1,94 @@
+//! PM4Sand version 3.1, plane strain (Boulanger and Ziotopoulou 2017, UCD/CGM-17/01), as implemented by
+//! Chen and Arduino (2021, PEER 2021/02). Framework: Dafalias and Manzari (2004).
+//!
+//! Inside this module compression is positive and a stress is its in-plane mean `p = (xx + yy)/2` and its
+//! deviator `s`; the border types [`Stress`] and [`StrainIncrement`] are tension positive. The whole state lives
+//! in a frame that turns with the material, which is exactly the Jaumann rate for every tensor at once.
+
+mod flow;
+mod initialise;
+mod integrate;
+mod parameters;
+mod rates;
+mod reversal;
+mod state;
+mod surfaces;
+
+pub use parameters::{Constants, Options, PM4Sand, Parameters};
+pub use state::State;
+
+use crate::{Deviator, Integrator, Moduli, SoilError, StrainIncrement, Stress, UpdateReport, error::finite};
+use state::Strain;
+
+/// Largest strain component accepted in one increment: 1000 %, beyond which no path means anything.
+const MAX_STRAIN_INCREMENT: f64 = 10.0;
+
+impl PM4Sand {
+    /// Moves a state through a strain increment. On error the state is unchanged.
+    ///
+    /// Errors: [`SoilError::NonFinite`] for an increment or a result that is not finite,
+    /// [`SoilError::StrainIncrementTooLarge`] above 1000 %.
+    pub fn update(
+        &self,
+        state: &mut State,
+        de: &StrainIncrement,
+        integrator: &Integrator,
+    ) -> Result<UpdateReport, SoilError> {
+        let largest = de.xx.abs().max(de.yy.abs()).max(de.xy.abs());
+        let sum = finite("strain increment", de.xx + de.yy + de.xy + de.spin)?;
+        if !(largest <= MAX_STRAIN_INCREMENT) {
+            let value = if largest.is_finite() { largest } else { sum };
+            return Err(SoilError::StrainIncrementTooLarge { value, limit: MAX_STRAIN_INCREMENT });
+        }
+        let mut next = *state;
+        let mut strain = Strain {
+            volume: -(de.xx + de.yy),
+            deviator: Deviator { half_difference: -0.5 * (de.xx - de.yy), xy: -0.5 * de.xy },
+        };
+        if de.spin != 0.0 || state.rotation != 0.0 {
+            // The angle at mid-step makes the split between rotation and strain second-order accurate.
+            let middle = state.rotation - 0.5 * de.spin;
+            strain.deviator = strain.deviator.in_axes_turned(double_angle(middle));
+            next.rotation -= de.spin;
+        }
+        let mut report = UpdateReport::default();
+        self.integrate(&mut next, strain, integrator, &mut report);
+        finite("stress", next.mean + next.deviator.half_difference + next.deviator.xy + next.out_of_plane)?;
+        finite("back-stress ratio", next.alpha.half_difference + next.alpha.xy)?;
+        finite("fabric", next.fabric.half_difference + next.fabric.xy + next.fabric_cumulative)?;
+        finite("shear modulus", next.moduli.shear)?;
+        *state = next;
+        Ok(report)
+    }
+
+    /// Effective stress in space axes, kPa, tension positive, the offset stress of an inadmissible start included.
+    pub fn stress(&self, state: &State) -> Stress {
+        let mean = state.mean + state.offset.mean;
+        let mut deviator = state.deviator + state.offset.deviator;
+        if state.rotation != 0.0 {
+            deviator = deviator.in_axes_turned(double_angle(-state.rotation));
+        }
+        Stress {
+            xx: -(mean + deviator.half_difference),
+            yy: -(mean - deviator.half_difference),
+            xy: -deviator.xy,
+            zz: -(state.out_of_plane + state.offset.out_of_plane),
+        }
+    }
+
+    /// Elastic moduli of the last commit, kPa.
+    pub fn moduli(&self, state: &State) -> Moduli {
+        state.moduli
+    }
+
+    /// Void ratio.
+    pub fn void_ratio(&self, state: &State) -> f64 {
+        state.void_ratio_at(state.volumetric_strain)
+    }
+}
+
+/// Cosine and sine of twice an angle.
+fn double_angle(angle: f64) -> (f64, f64) {
+    let (sin2, cos2) = (2.0 * angle).sin_cos();
+    (cos2, sin2)
+}

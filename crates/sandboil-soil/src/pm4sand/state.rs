@@ -1,0 +1,151 @@
+//! What a stress point remembers.
+
+use crate::{Deviator, Moduli};
+
+/// A strain (increment) in the model's convention: compression positive, material frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Strain {
+    /// Volumetric strain `e_xx + e_yy`.
+    pub volume: f64,
+    /// In-plane deviator with tensor shear.
+    pub deviator: Deviator,
+}
+
+impl Strain {
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { volume: self.volume * factor, deviator: self.deviator * factor }
+    }
+
+    /// Largest absolute component of (xx, yy, engineering shear).
+    pub fn largest_component(self) -> f64 {
+        (0.5 * self.volume.abs() + self.deviator.half_difference.abs()).max(2.0 * self.deviator.xy.abs())
+    }
+}
+
+/// Three independent components. The component rule of the apparent back-stress ratio needs them: it may leave
+/// that tensor slightly non-traceless, and keeps it so.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Components(pub [f64; 3]);
+
+impl Components {
+    pub const ZERO: Self = Self([0.0; 3]);
+
+    pub fn of(tensor: Deviator) -> Self {
+        Self([tensor.half_difference, -tensor.half_difference, tensor.xy])
+    }
+
+    /// The traceless part, all that a contraction with a traceless direction sees.
+    #[inline]
+    pub fn deviator(self) -> Deviator {
+        let [xx, yy, xy] = self.0;
+        Deviator { half_difference: 0.5 * (xx - yy), xy }
+    }
+}
+
+/// Stress added to what the host receives because the initial stress was not admissible. Compression positive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Offset {
+    pub mean: f64,
+    pub deviator: Deviator,
+    pub out_of_plane: f64,
+}
+
+/// State of one PM4Sand stress point. Made by [`super::PM4Sand::initialise`]; all tensors in the material frame,
+/// compression positive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State {
+    /// In-plane mean effective stress p, kPa.
+    pub(super) mean: f64,
+    /// Deviator s, kPa.
+    pub(super) deviator: Deviator,
+    /// Out-of-plane effective stress, kPa; the model itself does not use it.
+    pub(super) out_of_plane: f64,
+    pub(super) offset: Offset,
+    /// Void ratio at zero strain.
+    pub(super) void_ratio_initial: f64,
+    /// Volumetric strain since initialisation, compression positive.
+    pub(super) volumetric_strain: f64,
+    /// Expansion spent at the pressure floor and not yet recovered (gap memory).
+    pub(super) gap: f64,
+    /// Back-stress ratio alpha.
+    pub(super) alpha: Deviator,
+    /// Apparent initial back-stress ratio.
+    pub(super) alpha_in: Components,
+    /// Previous apparent initial back-stress ratio.
+    pub(super) alpha_in_previous: Components,
+    /// Back-stress ratio at the last reversal.
+    pub(super) alpha_in_true: Deviator,
+    pub(super) alpha_max: Components,
+    pub(super) alpha_min: Components,
+    /// Fabric-dilatancy tensor z.
+    pub(super) fabric: Deviator,
+    /// Fabric at the last reversal.
+    pub(super) fabric_in: Deviator,
+    /// Cumulative fabric, monotonic.
+    pub(super) fabric_cumulative: f64,
+    /// Largest fabric so far.
+    pub(super) fabric_peak: f64,
+    /// Mean stress when `|z| p` was largest, kPa.
+    pub(super) p_zp: f64,
+    /// Largest `|z| p` at a reversal, kPa.
+    pub(super) zp_max: f64,
+    /// No reversal has set `p_zp` yet.
+    pub(super) before_first_reversal: bool,
+    pub(super) moduli: Moduli,
+    /// Bounding ratio of the last evaluation.
+    pub(super) bounding_ratio: f64,
+    /// Pressure below which the formulas are not followed, kPa.
+    pub(super) p_min: f64,
+    pub(super) fabric_limit: f64,
+    pub(super) dilatancy_scale: f64,
+    /// Counter-clockwise angle of the material frame, radians.
+    pub(super) rotation: f64,
+}
+
+impl State {
+    /// Void ratio after a volumetric strain (compression positive) since initialisation.
+    #[inline]
+    pub(super) fn void_ratio_at(&self, volumetric_strain: f64) -> f64 {
+        self.void_ratio_initial - (1.0 + self.void_ratio_initial) * volumetric_strain
+    }
+
+    /// In-plane mean effective stress p = (xx + yy)/2 of the model, kPa, compression positive.
+    pub fn mean_stress(&self) -> f64 {
+        self.mean
+    }
+
+    /// Back-stress ratio alpha, material frame, compression positive.
+    pub fn back_stress_ratio(&self) -> Deviator {
+        self.alpha
+    }
+
+    /// Apparent initial back-stress ratio, material frame, compression positive.
+    pub fn apparent_initial_back_stress_ratio(&self) -> Deviator {
+        self.alpha_in.deviator()
+    }
+
+    /// Fabric-dilatancy tensor z, material frame, compression positive.
+    pub fn fabric(&self) -> Deviator {
+        self.fabric
+    }
+
+    /// Cumulative fabric.
+    pub fn cumulative_fabric(&self) -> f64 {
+        self.fabric_cumulative
+    }
+
+    /// Lower limit of the pressure used in the formulas, kPa; the mean stress itself never falls below a fifth of it.
+    pub fn minimum_pressure(&self) -> f64 {
+        self.p_min
+    }
+
+    /// Expansion spent at the pressure floor and not yet recovered; zero unless gap memory is on.
+    pub fn gap_strain(&self) -> f64 {
+        self.gap
+    }
+
+    /// Counter-clockwise angle by which the material frame has turned, radians.
+    pub fn rotation(&self) -> f64 {
+        self.rotation
+    }
+}

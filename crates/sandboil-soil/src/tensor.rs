@@ -1,0 +1,103 @@
+//! In-plane tensors. A symmetric plane tensor is its mean and its deviator; the deviator has two numbers.
+
+use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+
+/// Effective stress, kPa, tension positive; `x` horizontal, `y` up, `zz` out of plane.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Stress {
+    /// Horizontal normal stress, kPa.
+    pub xx: f64,
+    /// Vertical normal stress, kPa.
+    pub yy: f64,
+    /// Shear stress, kPa.
+    pub xy: f64,
+    /// Out-of-plane normal stress, kPa.
+    pub zz: f64,
+}
+
+/// Strain increment of a plane-strain point, tension positive.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct StrainIncrement {
+    /// Horizontal normal strain.
+    pub xx: f64,
+    /// Vertical normal strain.
+    pub yy: f64,
+    /// Engineering shear strain, `dv_x/dy + dv_y/dx` times the time increment.
+    pub xy: f64,
+    /// Rotation, `(dv_x/dy - dv_y/dx)/2` times the time increment: clockwise positive, radians.
+    pub spin: f64,
+}
+
+/// Deviator of a symmetric plane tensor: `xx = -yy = half_difference`.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Deviator {
+    /// `(xx - yy)/2`.
+    pub half_difference: f64,
+    /// Shear component (a tensor component: half of an engineering shear strain).
+    pub xy: f64,
+}
+
+impl Deviator {
+    /// The zero tensor.
+    pub const ZERO: Self = Self { half_difference: 0.0, xy: 0.0 };
+
+    /// Double contraction `A:B`.
+    #[inline]
+    pub fn contract(self, other: Self) -> f64 {
+        2.0 * (self.half_difference * other.half_difference + self.xy * other.xy)
+    }
+
+    /// `sqrt(A:A)`.
+    #[inline]
+    pub fn norm(self) -> f64 {
+        self.contract(self).sqrt()
+    }
+
+    /// The same tensor seen in axes turned counter-clockwise by the angle whose double has this cosine and sine.
+    #[inline]
+    pub(crate) fn in_axes_turned(self, (cos2, sin2): (f64, f64)) -> Self {
+        Self {
+            half_difference: self.half_difference * cos2 + self.xy * sin2,
+            xy: self.xy * cos2 - self.half_difference * sin2,
+        }
+    }
+}
+
+impl Add for Deviator {
+    type Output = Self;
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self { half_difference: self.half_difference + other.half_difference, xy: self.xy + other.xy }
+    }
+}
+
+impl AddAssign for Deviator {
+    #[inline]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl Sub for Deviator {
+    type Output = Self;
+    #[inline]
+    fn sub(self, other: Self) -> Self {
+        Self { half_difference: self.half_difference - other.half_difference, xy: self.xy - other.xy }
+    }
+}
+
+impl Neg for Deviator {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Self { half_difference: -self.half_difference, xy: -self.xy }
+    }
+}
+
+impl Mul<f64> for Deviator {
+    type Output = Self;
+    #[inline]
+    fn mul(self, factor: f64) -> Self {
+        Self { half_difference: self.half_difference * factor, xy: self.xy * factor }
+    }
+}
