@@ -1,9 +1,16 @@
 //! Private binding module `sandboil._core`: converts, calls, converts.
 
+mod errors;
+mod material;
+mod simulation;
+
 /// The extension module `sandboil._core`.
 #[pyo3::pymodule]
 mod _core {
     use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::simulation::{Simulation, stress_node_offset};
 
     #[pymodule_init]
     fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -1,1 +1,27 @@
-//! Placeholder replaced in the first slice.
+//! Three-phase solver for saturated ground under static and seismic load: fields, momentum, flow, stress,
+//! boundaries, stepping and stages. It knows no file and no Python.
+//!
+//! Equation numbers are those of Mhaski & Ramana (2025), CMES 142(1). Units: kN, m, s, Mg; stress tension
+//! positive, pore pressure compression positive; x horizontal, y up.
+
+mod banded;
+pub mod base;
+pub mod error;
+mod flow;
+mod geometry;
+pub mod model;
+mod parallel;
+mod record;
+pub mod simulation;
+mod skeleton;
+mod soil_field;
+mod timestep;
+
+pub use base::UpgoingWave;
+pub use error::SolverError;
+pub use model::{
+    AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, Soil, Water, stress_node_offset,
+};
+pub use sandboil_sph::{Period, Vec2};
+pub use simulation::{Counters, Gravity, SHAKING_FACTOR, Shaking, Simulation};
+pub use timestep::Criterion;

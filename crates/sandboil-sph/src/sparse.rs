@@ -32,7 +32,9 @@ impl<T: Copy + AddAssign> Csr<T> {
         for &(column, value) in entries.iter() {
             let row_is_open = self.column.len() > self.start[self.start.len() - 1] as usize;
             match self.value.last_mut() {
-                Some(last) if row_is_open && self.column[self.column.len() - 1] == column => *last += value,
+                Some(last) if row_is_open && self.column[self.column.len() - 1] == column => {
+                    *last += value;
+                }
                 _ => {
                     self.column.push(column);
                     self.value.push(value);
@@ -43,6 +45,7 @@ impl<T: Copy + AddAssign> Csr<T> {
     }
 
     /// The table with rows and columns exchanged; rows of the result hold their columns in rising order.
+    #[must_use]
     pub fn transposed(&self, columns: usize) -> Self {
         let mut start = vec![0_u32; columns + 1];
         for &column in &self.column {
@@ -64,6 +67,15 @@ impl<T: Copy + AddAssign> Csr<T> {
         }
         let value = source.into_iter().map(|entry| self.value[entry]).collect();
         Self { start, column: row_of, value }
+    }
+}
+
+impl<T: Copy + std::ops::MulAssign<f64>> Csr<T> {
+    /// Multiplies every entry by the factor of its column.
+    pub fn scale_by_column(&mut self, factor: &[f64]) {
+        for (value, &column) in self.value.iter_mut().zip(&self.column) {
+            *value *= factor[column as usize];
+        }
     }
 }
 

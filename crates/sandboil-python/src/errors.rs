@@ -1,0 +1,36 @@
+//! Core errors as Python exceptions. The classes live in `sandboil._errors`; here they are looked up and filled.
+
+use pyo3::{prelude::*, types::PyDict};
+use sandboil_solver::SolverError;
+
+/// A solver error on its way to Python.
+pub struct CoreError(pub SolverError);
+
+impl From<CoreError> for PyErr {
+    fn from(CoreError(error): CoreError) -> Self {
+        Python::attach(|py| exception(py, error).unwrap_or_else(|failure| failure))
+    }
+}
+
+fn exception(py: Python<'_>, error: SolverError) -> PyResult<PyErr> {
+    let classes = py.import("sandboil._errors")?;
+    let keywords = PyDict::new(py);
+    let raised = match error {
+        SolverError::Diverged { quantity, node, x, y, time, step, .. } => {
+            keywords.set_item("quantity", quantity)?;
+            keywords.set_item("node", node)?;
+            keywords.set_item("position", (x, y))?;
+            keywords.set_item("time", time)?;
+            keywords.set_item("step", step)?;
+            classes.getattr("SimulationDiverged")?.call((), Some(&keywords))?
+        }
+        SolverError::InvalidInput { name, value, expected } => {
+            keywords.set_item("path", name)?;
+            keywords.set_item("value", value)?;
+            keywords.set_item("allowed", format!("must be {expected}"))?;
+            classes.getattr("InvalidInput")?.call((), Some(&keywords))?
+        }
+        other => classes.getattr("SandboilError")?.call1((other.to_string(),))?,
+    };
+    Ok(PyErr::from_value(raised))
+}

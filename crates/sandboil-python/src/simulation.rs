@@ -1,0 +1,320 @@
+//! The solver as a Python class: arrays in, arrays out, chunks of steps in between.
+
+use crate::{
+    errors::CoreError,
+    material::{integrator, soil},
+};
+use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, ToPyArray, ndarray::Array};
+use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
+use sandboil_solver as solver;
+use std::time::{Duration, Instant};
+
+/// Steps between looks at the clock.
+const STEPS_PER_LOOK: u64 = 32;
+
+fn get<'py, T>(dict: &Bound<'py, PyDict>, key: &str) -> PyResult<T>
+where
+    T: for<'a> FromPyObject<'a, 'py>,
+    for<'a> <T as FromPyObject<'a, 'py>>::Error: Into<PyErr>,
+{
+    let value = dict.get_item(key)?.ok_or_else(|| PyValueError::new_err(format!("{key} is missing")))?;
+    value.extract().map_err(Into::into)
+}
+
+fn one_of<T: Copy>(key: &str, value: &str, choices: &[(&str, T)]) -> PyResult<T> {
+    choices.iter().find(|(name, _)| *name == value).map(|(_, choice)| *choice).ok_or_else(|| {
+        let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();
+        PyValueError::new_err(format!("{key} = {value:?}: must be one of {names:?}"))
+    })
+}
+
+fn vectors(rows: &PyReadonlyArray2<'_, f64>) -> Vec<solver::Vec2> {
+    rows.as_array().outer_iter().map(|row| solver::Vec2::new(row[0], row[1])).collect()
+}
+
+fn numerics(dict: &Bound<'_, PyDict>) -> PyResult<solver::Numerics> {
+    let text = |key| get::<String>(dict, key);
+    Ok(solver::Numerics {
+        operators: one_of(
+            "operators",
+            &text("operators")?,
+            &[("conservative", solver::Operators::Conservative), ("printed", solver::Operators::Printed)],
+        )?,
+        smoothing_ratio: get(dict, "smoothing_ratio")?,
+        velocity_filter: get(dict, "velocity_filter")?,
+        diffusion: one_of(
+            "diffusion",
+            &text("diffusion")?,
+            &[
+                ("auto", solver::Diffusion::Auto),
+                ("implicit", solver::Diffusion::Implicit),
+                ("explicit", solver::Diffusion::Explicit),
+            ],
+        )?,
+        acceleration_term: one_of(
+            "acceleration_term",
+            &text("acceleration_term")?,
+            &[
+                ("auto", solver::AccelerationTerm::Auto),
+                ("on", solver::AccelerationTerm::On),
+                ("off", solver::AccelerationTerm::Off),
+            ],
+        )?,
+        geometry_strain_limit: get(dict, "geometry_strain_limit")?,
+        integrator: integrator(&text("integrator")?, get(dict, "integrator_tolerance")?, None)?,
+    })
+}
+
+fn region(dict: &Bound<'_, PyDict>, gap_memory: bool) -> PyResult<solver::Region> {
+    Ok(solver::Region {
+        soil: soil(&get::<Bound<'_, PyDict>>(dict, "material")?, gap_memory)?,
+        porosity: get(dict, "porosity")?,
+        solid_density: get(dict, "solid_density")?,
+        hydraulic_conductivity: get(dict, "hydraulic_conductivity")?,
+        earth_pressure_coefficient: get(dict, "earth_pressure_coefficient")?,
+        static_poisson_ratio: get(dict, "static_poisson_ratio")?,
+    })
+}
+
+fn model(dict: &Bound<'_, PyDict>) -> PyResult<solver::Model> {
+    let numerics_dict: Bound<'_, PyDict> = get(dict, "numerics")?;
+    let gap_memory = get(&numerics_dict, "gap_memory")?;
+    let regions: Vec<Bound<'_, PyDict>> = get(dict, "regions")?;
+    let water: Option<(f64, f64)> = get(dict, "water")?;
+    let (dx, dy): (f64, f64) = get(dict, "spacing")?;
+    let floats =
+        |key| -> PyResult<Vec<f64>> { Ok(get::<PyReadonlyArray1<'_, f64>>(dict, key)?.as_slice()?.to_vec()) };
+    Ok(solver::Model {
+        spacing: solver::Vec2::new(dx, dy),
+        position: vectors(&get(dict, "position")?),
+        region: get::<PyReadonlyArray1<'_, u32>>(dict, "region")?.as_slice()?.to_vec(),
+        regions: regions.iter().map(|entry| region(entry, gap_memory)).collect::<PyResult<_>>()?,
+        surface_elevation: floats("surface_elevation")?,
+        vertical_effective_stress: floats("vertical_effective_stress")?,
+        pore_pressure: floats("pore_pressure")?,
+        water: water.map(|(unit_weight, bulk_modulus)| solver::Water { unit_weight, bulk_modulus }),
+        gravity: get(dict, "gravity")?,
+        period: get::<Option<f64>>(dict, "period")?.map(|width| solver::Period { width }),
+        base_elevation: get(dict, "base_elevation")?,
+        numerics: numerics(&numerics_dict)?,
+    })
+}
+
+/// Offset of a node's first stress node, m; the second lies opposite.
+#[pyfunction]
+pub fn stress_node_offset(dx: f64, dy: f64) -> (f64, f64) {
+    let offset = solver::stress_node_offset(solver::Vec2::new(dx, dy));
+    (offset.x, offset.y)
+}
+
+/// A section under way. Arrays are copies, in the order of the nodes given.
+#[pyclass(module = "sandboil._core")]
+pub struct Simulation {
+    inner: solver::Simulation,
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    fn new(description: &Bound<'_, PyDict>, threads: usize) -> PyResult<Self> {
+        let model = model(description)?;
+        let inner = description.py().detach(|| solver::Simulation::new(model, threads)).map_err(CoreError)?;
+        Ok(Self { inner })
+    }
+
+    #[pyo3(signature = (*, tolerance, max_steps))]
+    fn begin_gravity(&mut self, tolerance: f64, max_steps: u64) -> PyResult<()> {
+        Ok(self.inner.begin_gravity(solver::Gravity { tolerance, max_steps }).map_err(CoreError)?)
+    }
+
+    fn begin_shaking(&mut self, stage: &Bound<'_, PyDict>) -> PyResult<()> {
+        let wave: Option<(f64, PyReadonlyArray1<'_, f64>)> = get(stage, "wave")?;
+        let wave = wave
+            .map(|(interval, velocity)| -> PyResult<_> {
+                Ok(solver::UpgoingWave { interval, velocity: velocity.as_slice()?.to_vec() })
+            })
+            .transpose()?;
+        let stage = solver::Shaking {
+            duration: get(stage, "duration")?,
+            wave,
+            half_space: get(stage, "half_space")?,
+            local_damping: get(stage, "local_damping")?,
+            time_step_factor: get::<Option<f64>>(stage, "time_step_factor")?
+                .unwrap_or(solver::SHAKING_FACTOR),
+            probes: vectors(&get(stage, "probes")?),
+            history_interval: get(stage, "history_interval")?,
+            stress_histories: get(stage, "stress_histories")?,
+            pressure_envelope: get(stage, "pressure_envelope")?,
+            strain_envelope: get(stage, "strain_envelope")?,
+        };
+        Ok(self.inner.begin_shaking(stage).map_err(CoreError)?)
+    }
+
+    fn set_excess_pore_pressure(&mut self, excess: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
+        Ok(self.inner.set_excess_pore_pressure(excess.as_slice()?).map_err(CoreError)?)
+    }
+
+    /// Steps until `until` (s), `steps` are made or `seconds` have passed; returns whether the stage is over.
+    #[pyo3(signature = (*, steps, until, seconds))]
+    fn advance(&mut self, py: Python<'_>, steps: u64, until: f64, seconds: f64) -> PyResult<bool> {
+        let inner = &mut self.inner;
+        let outcome = py.detach(|| -> Result<bool, solver::SolverError> {
+            let budget = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
+            let start = Instant::now();
+            let target = inner.step().saturating_add(steps);
+            loop {
+                let before = inner.step();
+                let done = inner.advance(STEPS_PER_LOOK.min(target - before), until)?;
+                if done || inner.step() == before || inner.step() >= target || start.elapsed() >= budget {
+                    return Ok(done);
+                }
+            }
+        });
+        py.check_signals()?;
+        Ok(outcome.map_err(CoreError)?)
+    }
+
+    #[getter]
+    fn time(&self) -> f64 {
+        self.inner.time()
+    }
+
+    #[getter]
+    fn step(&self) -> u64 {
+        self.inner.step()
+    }
+
+    /// Present time step (s) and the name of what limits it.
+    #[getter]
+    fn time_step(&self) -> (f64, &'static str) {
+        let (dt, criterion) = self.inner.time_step();
+        (dt, criterion.name())
+    }
+
+    #[getter]
+    fn is_complete(&self) -> bool {
+        self.inner.is_complete()
+    }
+
+    #[getter]
+    fn residual(&self) -> f64 {
+        self.inner.residual()
+    }
+
+    #[getter]
+    fn pairs(&self) -> usize {
+        self.inner.pairs()
+    }
+
+    #[getter]
+    fn base_impedance(&self) -> Vec<f64> {
+        self.inner.base_impedances()
+    }
+
+    #[getter]
+    fn flow_scheme(&self) -> &'static str {
+        self.inner.flow_scheme_name()
+    }
+
+    /// Names and bytes of the arrays that exist.
+    fn arrays(&self) -> Vec<(&'static str, usize)> {
+        self.inner.arrays()
+    }
+
+    /// Work done, by kind.
+    fn counters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let counters = self.inner.counters();
+        let dict = PyDict::new(py);
+        for (name, value) in [
+            ("steps", counters.steps),
+            ("flow_calls", counters.flow_calls),
+            ("base_calls", counters.base_calls),
+            ("plastic_updates", counters.plastic_updates),
+            ("geometry_builds", counters.geometry_builds),
+            ("time_step_changes", counters.time_step_changes),
+            ("substeps", counters.soil.substeps),
+            ("evaluations", counters.soil.evaluations),
+            ("pressure_floors", counters.soil.pressure_floors),
+            ("forced_acceptances", counters.soil.forced_acceptances),
+            ("reversals", counters.soil.reversals),
+            ("near_neutral_reversals", counters.soil.near_neutral_reversals),
+        ] {
+            dict.set_item(name, value)?;
+        }
+        Ok(dict)
+    }
+
+    fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        rows(py, &self.inner.position())
+    }
+
+    fn displacement<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        rows(py, &self.inner.displacement())
+    }
+
+    fn velocity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        rows(py, &self.inner.velocity())
+    }
+
+    fn acceleration<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        rows(py, &self.inner.acceleration())
+    }
+
+    fn excess_pore_pressure<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.inner.excess_pore_pressure().map(|values| values.to_pyarray(py))
+    }
+
+    fn largest_excess_pore_pressure<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.inner.largest_excess_pore_pressure().map(|values| values.to_pyarray(py))
+    }
+
+    fn largest_shear_strain<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.inner.largest_shear_strain().map(|values| values.to_pyarray(py))
+    }
+
+    /// Effective stress (n, 2, 4): `xx, yy, xy, zz` of both stress nodes, kPa, tension positive.
+    fn stress<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        pages(py, &self.inner.stress())
+    }
+
+    /// Strain (n, 2, 3): `xx, yy`, engineering `xy` of both stress nodes.
+    fn strain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        pages(py, &self.inner.strain())
+    }
+
+    fn channel_names(&self) -> Vec<&'static str> {
+        self.inner.channel_names()
+    }
+
+    /// History samples since the last call: times (m,) and values (m, probes, channels).
+    fn take_histories<'py>(
+        &mut self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>)> {
+        let (times, values) = self.inner.take_histories();
+        let channels = self.inner.channel_names().len();
+        let samples = times.len();
+        let probes = if samples == 0 || channels == 0 { 0 } else { values.len() / (samples * channels) };
+        Ok((times.to_pyarray(py), shaped(values, (samples, probes, channels))?.to_pyarray(py)))
+    }
+}
+
+fn shaped<D: numpy::ndarray::Dimension>(
+    values: Vec<f64>,
+    shape: impl numpy::ndarray::IntoDimension<Dim = D>,
+) -> PyResult<Array<f64, D>> {
+    Array::from_shape_vec(shape.into_dimension(), values)
+        .map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+fn rows<'py>(py: Python<'py>, values: &[[f64; 2]]) -> Bound<'py, PyArray2<f64>> {
+    numpy::ndarray::arr2(values).to_pyarray(py)
+}
+
+fn pages<'py, const N: usize>(
+    py: Python<'py>,
+    values: &[[[f64; N]; 2]],
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let flat = values.iter().flatten().flatten().copied().collect();
+    Ok(shaped(flat, (values.len(), 2, N))?.to_pyarray(py))
+}

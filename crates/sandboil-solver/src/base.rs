@@ -1,0 +1,147 @@
+//! Compliant base (Eq. 14 as corrected): an incoming shear wave and a dashpot, through the trace of the
+//! velocity field on the base.
+
+use crate::{geometry::point_weights, model::Model};
+use sandboil_sph::{Csr, Vec2};
+
+/// Velocity history of the upgoing wave at the base: half of an outcrop motion, m/s.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UpgoingWave {
+    /// Sampling interval, s.
+    pub interval: f64,
+    /// Horizontal velocity, m/s, first sample at time zero; at rest after the last.
+    pub velocity: Vec<f64>,
+}
+
+impl UpgoingWave {
+    /// Velocity at a time by linear interpolation, zero outside the record.
+    pub fn at(&self, time: f64) -> f64 {
+        let place = time / self.interval;
+        if !(place >= 0.0) {
+            return 0.0;
+        }
+        let before = place.floor();
+        let fraction = place - before;
+        let sample = |index: f64| {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // whole and not negative
+            self.velocity.get(index as usize).copied().unwrap_or(0.0)
+        };
+        sample(before) * (1.0 - fraction) + sample(before + 1.0) * fraction
+    }
+}
+
+/// One boundary point below each node of the lowest row.
+#[derive(Debug, Clone)]
+pub struct CompliantBase {
+    /// Linear-fit weights of the velocity on the base: rows are base points, columns velocity nodes.
+    trace: Csr<f64>,
+    /// Dashpot coefficient `eta = rho_m C_s`, kPa s/m.
+    impedance: Vec<f64>,
+    /// `sum_j N_ij sum_k N_kj A_k eta_k / m_j`: what a unit of the trace velocity loses in a second, 1/s.
+    rate: Vec<f64>,
+    /// Length of base each point stands for, m.
+    length: f64,
+    wave: Option<UpgoingWave>,
+    trace_before: Vec<f64>,
+    nodes: Vec<u32>,
+}
+
+impl CompliantBase {
+    /// Base points of the lowest row of `model`, with the impedance (kPa s/m) of each.
+    pub fn new(
+        model: &Model,
+        position: &[Vec2],
+        mass: &[f64],
+        impedance: Vec<f64>,
+        wave: Option<UpgoingWave>,
+    ) -> Self {
+        let points = base_points(model, position);
+        let trace = point_weights(model, position, &points);
+        let length = model.spacing.x;
+        let transposed = trace.transposed(position.len());
+        let drag = |node: usize| -> f64 {
+            transposed.iter_row(node).map(|(point, weight)| weight * length * impedance[point]).sum()
+        };
+        let rate: Vec<f64> = (0..points.len())
+            .map(|point| trace.iter_row(point).map(|(node, weight)| weight * drag(node) / mass[node]).sum())
+            .collect();
+        let mut nodes: Vec<u32> =
+            (0..points.len()).flat_map(|point| trace.row(point).0.iter().copied()).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        Self { trace_before: vec![0.0; points.len()], trace, impedance, rate, length, wave, nodes }
+    }
+
+    /// Velocity nodes the base acts on.
+    pub fn nodes(&self) -> &[u32] {
+        &self.nodes
+    }
+
+    /// Dashpot coefficients, kPa s/m.
+    pub fn impedance(&self) -> &[f64] {
+        &self.impedance
+    }
+
+    /// Remembers the trace before the step's forces act.
+    pub fn begin_step(&mut self, velocity: &[Vec2]) {
+        for (point, before) in self.trace_before.iter_mut().enumerate() {
+            *before = self.trace.iter_row(point).map(|(node, weight)| weight * velocity[node].x).sum();
+        }
+    }
+
+    /// Adds the base traction of Eq. 14 to velocities that all other forces of the step have moved already.
+    ///
+    /// The dashpot takes the mean of the trace before and after the step, so it is second order and never
+    /// limits the time step; the coupling between neighbouring points is lumped, exact for uniform motion.
+    pub fn end_step(
+        &mut self,
+        time: f64,
+        dt: f64,
+        mass: &[f64],
+        velocity: &mut [Vec2],
+        acceleration: &mut [Vec2],
+    ) {
+        let incoming = 2.0 * self.wave.as_ref().map_or(0.0, |wave| wave.at(time));
+        for point in 0..self.impedance.len() {
+            let moved: f64 = self.trace.iter_row(point).map(|(node, weight)| weight * velocity[node].x).sum();
+            let mean = 0.5 * (self.trace_before[point] + moved);
+            // The traction is kept in the slot of the old trace until all points have read the velocities.
+            self.trace_before[point] =
+                self.impedance[point] * (incoming - mean) / (1.0 + 0.5 * dt * self.rate[point]);
+        }
+        for point in 0..self.impedance.len() {
+            let force = self.trace_before[point] * self.length;
+            for (node, weight) in self.trace.iter_row(point) {
+                let pushed = weight * force / mass[node];
+                velocity[node].x += dt * pushed;
+                acceleration[node].x += pushed;
+            }
+        }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.trace.bytes() + 3 * size_of_val(self.impedance.as_slice())
+    }
+}
+
+/// Points on the base below the nodes of the lowest row, m.
+pub fn base_points(model: &Model, position: &[Vec2]) -> Vec<Vec2> {
+    position
+        .iter()
+        .filter(|x| x.y - model.base_elevation < model.spacing.y)
+        .map(|x| Vec2::new(x.x, model.base_elevation))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_wave_is_linear_between_samples_and_zero_outside() {
+        let wave = UpgoingWave { interval: 0.5, velocity: vec![1.0, 3.0] };
+        assert_eq!([-0.1, 0.0, 0.25, 0.5, 0.75, 1.1].map(|t| wave.at(t)), [0.0, 1.0, 2.0, 3.0, 1.5, 0.0]);
+        assert_eq!(wave.at(f64::NAN), 0.0);
+    }
+}

@@ -1,0 +1,85 @@
+//! What can go wrong in a solve, with the numbers a user needs to find the place.
+
+use sandboil_soil::SoilError;
+
+/// Errors of building or advancing a simulation.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub enum SolverError {
+    /// An input outside its range; refused before any work.
+    #[error("{name} = {value}: must be {expected}")]
+    InvalidInput {
+        /// Name of the quantity.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+        /// What is allowed.
+        expected: &'static str,
+    },
+    /// Arrays whose lengths contradict each other.
+    #[error("{name} has {found} entries, {expected} are needed")]
+    Shape {
+        /// Name of the array.
+        name: &'static str,
+        /// Length given.
+        found: usize,
+        /// Length needed.
+        expected: usize,
+    },
+    /// A call that needs another stage first.
+    #[error("{call} needs {needs} first")]
+    Order {
+        /// What was called.
+        call: &'static str,
+        /// What has to come before.
+        needs: &'static str,
+    },
+    /// A field left the range of finite or sensible numbers.
+    #[error("{quantity} of node {node} at ({x:.3}, {y:.3}) m is {value} at time {time:.6} s, step {step}")]
+    Diverged {
+        /// The field.
+        quantity: &'static str,
+        /// Node in the user's order.
+        node: usize,
+        /// Position, m.
+        x: f64,
+        /// Position, m.
+        y: f64,
+        /// The offending value.
+        value: f64,
+        /// Time in the stage, s.
+        time: f64,
+        /// Step in the stage.
+        step: u64,
+    },
+    /// The static stage did not reach its tolerance.
+    #[error(
+        "gravity stage not at rest after {steps} steps: max |a|/g {residual:.2e}, wanted {tolerance:.1e}"
+    )]
+    NotAtRest {
+        /// Steps made.
+        steps: u64,
+        /// Largest unbalanced acceleration over gravity.
+        residual: f64,
+        /// Tolerance asked.
+        tolerance: f64,
+    },
+    /// A soil model refused its input or failed.
+    #[error("soil model of region {region}, node {node}: {source}")]
+    Soil {
+        /// Region index.
+        region: usize,
+        /// Node in the user's order.
+        node: usize,
+        /// The model's own words.
+        source: SoilError,
+    },
+    /// The thread pool could not be made.
+    #[error("cannot start {threads} threads: {reason}")]
+    Threads {
+        /// Threads asked.
+        threads: usize,
+        /// The operating system's words.
+        reason: String,
+    },
+}

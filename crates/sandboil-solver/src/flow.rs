@@ -1,0 +1,208 @@
+//! Pore pressure of the single-layer u-p formulation (Eq. 3, discretised by Eq. 7), saturated.
+//!
+//! The unknown is the excess over the pressure at the start of the stage, in kPa: its reference is carried by
+//! the constant nodal forces, and only the increments meet the transposed operators.
+
+use crate::{banded::BandedLu, geometry::FlowTables, model::Model};
+use sandboil_sph::{Csr, Vec2};
+
+/// A node whose pressure follows from the prescribed value on the free surface (half-cell rule).
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct SurfaceNode {
+    node: u32,
+    inner: u32,
+    /// Depth of the node over the depth of the inner node.
+    fraction: f64,
+}
+
+/// Excess pore pressure and what moves it.
+#[derive(Debug, Clone)]
+pub struct Flow {
+    /// Excess pore pressure at velocity nodes, kPa, compression positive.
+    pub excess: Vec<f64>,
+    /// `K_f / n`: pressure rise per unit of volume strain, kPa.
+    stiffness: Vec<f64>,
+    /// Hydraulic conductivity, m/s.
+    conductivity: Vec<f64>,
+    unit_weight: f64,
+    gravity: f64,
+    surface: Vec<SurfaceNode>,
+    scheme: Scheme,
+    right_hand_side: Vec<f64>,
+}
+
+#[derive(Debug, Clone)]
+enum Scheme {
+    /// No conductivity: pressure changes by volume strain alone.
+    Undrained,
+    /// Forward Euler, with or without the acceleration term.
+    Explicit { acceleration_term: bool },
+    /// Backward Euler; factors belong to a time step.
+    Implicit { factors: Option<(f64, BandedLu)> },
+}
+
+/// What the caller chose for a stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FlowScheme {
+    /// No diffusion.
+    Undrained,
+    /// Forward Euler without the acceleration term.
+    Explicit,
+    /// Forward Euler with the acceleration term.
+    ExplicitWithAcceleration,
+    /// Backward Euler.
+    Implicit,
+}
+
+impl Flow {
+    /// Zero excess pressure everywhere.
+    pub fn new(model: &Model, scheme: FlowScheme) -> Option<Self> {
+        let water = model.water?;
+        let per_node =
+            |value: &dyn Fn(usize) -> f64| model.region.iter().map(|&r| value(r as usize)).collect();
+        Some(Self {
+            excess: vec![0.0; model.nodes()],
+            stiffness: per_node(&|region| model.water_stiffness(region)),
+            conductivity: per_node(&|region| model.regions[region].hydraulic_conductivity),
+            unit_weight: water.unit_weight,
+            gravity: model.gravity,
+            surface: surface_nodes(model),
+            scheme: match scheme {
+                FlowScheme::Undrained => Scheme::Undrained,
+                FlowScheme::Explicit => Scheme::Explicit { acceleration_term: false },
+                FlowScheme::ExplicitWithAcceleration => Scheme::Explicit { acceleration_term: true },
+                FlowScheme::Implicit => Scheme::Implicit { factors: None },
+            },
+            right_hand_side: vec![0.0; model.nodes()],
+        })
+    }
+
+    /// Forgets factors made for another geometry.
+    pub fn geometry_changed(&mut self) {
+        if let Scheme::Implicit { factors } = &mut self.scheme {
+            *factors = None;
+        }
+    }
+
+    /// The scheme in the user's words.
+    pub fn scheme_name(&self) -> &'static str {
+        match self.scheme {
+            Scheme::Undrained => "undrained",
+            Scheme::Explicit { acceleration_term: false } => "explicit",
+            Scheme::Explicit { acceleration_term: true } => "explicit with acceleration term",
+            Scheme::Implicit { .. } => "implicit",
+        }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let factors = match &self.scheme {
+            Scheme::Implicit { factors: Some((_, lu)) } => lu.bytes(),
+            _ => 0,
+        };
+        4 * size_of_val(self.excess.as_slice()) + factors
+    }
+
+    /// Advances the excess pressure by one step from the velocity field at its middle (Eq. 7).
+    ///
+    /// Returns `false` when the implicit matrix cannot be factored (not finite).
+    #[must_use]
+    pub fn step(&mut self, tables: &FlowTables, velocity: &[Vec2], acceleration: &[Vec2], dt: f64) -> bool {
+        let divergence = &tables.divergence.forward;
+        for node in 0..self.excess.len() {
+            let volume_rate: f64 =
+                divergence.iter_row(node).map(|(j, weight)| weight.dot(&velocity[j])).sum();
+            // dp = (gamma_f / C) dh-rate with C = n gamma_f / K_f.
+            self.right_hand_side[node] = self.excess[node] - dt * self.stiffness[node] * volume_rate;
+        }
+        match (&mut self.scheme, &tables.diffusion) {
+            (Scheme::Explicit { acceleration_term }, Some(diffusion)) => {
+                for node in 0..self.excess.len() {
+                    let mut rate: f64 =
+                        diffusion.iter_row(node).map(|(j, weight)| weight * self.excess[j]).sum();
+                    if *acceleration_term {
+                        let carried: f64 = divergence
+                            .iter_row(node)
+                            .map(|(j, weight)| weight.dot(&acceleration[j]) * self.conductivity[j])
+                            .sum();
+                        rate += carried * self.unit_weight / self.gravity;
+                    }
+                    self.right_hand_side[node] += dt * self.stiffness[node] / self.unit_weight * rate;
+                }
+                self.excess.copy_from_slice(&self.right_hand_side);
+                self.hold_surface();
+            }
+            (Scheme::Implicit { factors }, Some(diffusion)) => {
+                if factors.as_ref().is_none_or(|(made_for, _)| *made_for != dt) {
+                    let matrix =
+                        implicit_matrix(diffusion, &self.surface, &self.stiffness, dt / self.unit_weight);
+                    *factors = BandedLu::factor(&matrix).map(|lu| (dt, lu));
+                }
+                let Some((_, lu)) = factors else { return false };
+                for tie in &self.surface {
+                    self.right_hand_side[tie.node as usize] = 0.0;
+                }
+                lu.solve(&mut self.right_hand_side);
+                self.excess.copy_from_slice(&self.right_hand_side);
+            }
+            _ => {
+                self.excess.copy_from_slice(&self.right_hand_side);
+                self.hold_surface();
+            }
+        }
+        true
+    }
+
+    /// Half-cell rule: zero excess belongs to the surface, not to the centre of the node below it.
+    fn hold_surface(&mut self) {
+        for tie in &self.surface {
+            self.excess[tie.node as usize] = tie.fraction * self.excess[tie.inner as usize];
+        }
+    }
+}
+
+/// `I - dt/C div(k grad)` with the surface nodes' rows replaced by their tie.
+fn implicit_matrix(diffusion: &Csr<f64>, surface: &[SurfaceNode], stiffness: &[f64], scale: f64) -> Csr<f64> {
+    let mut matrix = Csr::with_capacity(diffusion.rows(), diffusion.entries());
+    let mut ties = surface.iter().peekable();
+    for row in 0..diffusion.rows() {
+        let own = u32::try_from(row).unwrap_or(u32::MAX);
+        let mut entries = vec![(own, 1.0)];
+        match ties.next_if(|tie| tie.node == own) {
+            Some(tie) => entries.push((tie.inner, -tie.fraction)),
+            None => {
+                let (columns, weights) = diffusion.row(row);
+                entries.extend(columns.iter().zip(weights).map(|(&c, w)| (c, -scale * stiffness[row] * w)));
+            }
+        }
+        matrix.push_row(&mut entries);
+    }
+    matrix
+}
+
+/// Nodes within one spacing of the surface, each with the node below that it interpolates to.
+fn surface_nodes(model: &Model) -> Vec<SurfaceNode> {
+    let depth = |node: usize| model.surface_elevation[node] - model.position[node].y;
+    let near: Vec<usize> = (0..model.nodes()).filter(|&node| depth(node) < model.spacing.y).collect();
+    let below = |node: usize| Vec2::new(model.position[node].x, model.position[node].y - model.spacing.y);
+    near.iter()
+        .filter_map(|&node| {
+            let wanted = below(node);
+            let miss = |other: usize| {
+                let mut offset = model.position[other] - wanted;
+                if let Some(period) = model.period {
+                    offset.x -= period.width * (offset.x / period.width).round();
+                }
+                offset.norm_squared()
+            };
+            let inner = (0..model.nodes())
+                .filter(|&other| depth(other) > depth(node))
+                .min_by(|&a, &b| miss(a).total_cmp(&miss(b)))?;
+            Some(SurfaceNode {
+                node: u32::try_from(node).unwrap_or(u32::MAX),
+                inner: u32::try_from(inner).unwrap_or(u32::MAX),
+                fraction: depth(node) / depth(inner),
+            })
+        })
+        .collect()
+}

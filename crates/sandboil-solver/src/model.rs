@@ -1,0 +1,247 @@
+//! What is solved: nodes, regions, water and numerical choices, checked once.
+
+use crate::error::SolverError;
+use sandboil_soil::{elastic::Elastic, pm4sand::PM4Sand};
+use sandboil_sph::{Period, Vec2};
+
+/// Stress nodes carried by each velocity node.
+pub const STRESS_NODES: usize = 2;
+
+/// Distance of a stress node from its velocity node over the particle spacing, along the diagonal (Section 3).
+const STRESS_NODE_DISTANCE: f64 = 1.0 / 3.0;
+
+/// A soil model as one region uses it.
+#[derive(Debug, Clone)]
+pub enum Soil {
+    /// Linear elasticity.
+    Elastic(Elastic),
+    /// PM4Sand, elastic in statics, plastic once shaking begins.
+    PM4Sand(Box<PM4Sand>),
+}
+
+impl Soil {
+    /// Shear modulus of the static stage, kPa: the model's modulus at one atmosphere for sand.
+    pub fn static_shear_modulus(&self) -> f64 {
+        match self {
+            Self::Elastic(elastic) => elastic.moduli().shear,
+            Self::PM4Sand(sand) => sand.parameters().g0 * sand.parameters().p_atm,
+        }
+    }
+}
+
+/// One region: a soil with its densities and conductivity.
+#[derive(Debug, Clone)]
+pub struct Region {
+    /// The soil model.
+    pub soil: Soil,
+    /// Porosity at the start, in (0, 1).
+    pub porosity: f64,
+    /// Density of the solid grains, Mg/m3.
+    pub solid_density: f64,
+    /// Isotropic hydraulic conductivity, m/s; zero is undrained.
+    pub hydraulic_conductivity: f64,
+    /// Earth pressure coefficient of the geostatic start.
+    pub earth_pressure_coefficient: f64,
+    /// Poisson's ratio of the static stage; `K0 / (1 + K0)` keeps the earth pressure coefficient.
+    pub static_poisson_ratio: f64,
+}
+
+/// Pore water.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Water {
+    /// Unit weight, kN/m3.
+    pub unit_weight: f64,
+    /// Bulk modulus, kPa.
+    pub bulk_modulus: f64,
+}
+
+/// The two sets of spatial operators.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Operators {
+    /// Least-squares gradient at the stress nodes and its exact transpose as force.
+    Conservative,
+    /// The paper's Eqs 5-13 with the corrections named in the theory page.
+    Printed,
+}
+
+/// How pore pressure diffuses in time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Diffusion {
+    /// Implicit where it lengthens the step, explicit otherwise.
+    Auto,
+    /// Backward Euler on the pressure alone.
+    Implicit,
+    /// Forward Euler; limits the time step.
+    Explicit,
+}
+
+/// The acceleration term of Eq. 7.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AccelerationTerm {
+    /// On with explicit diffusion and moderate conductivity.
+    Auto,
+    /// Always on (explicit diffusion only).
+    On,
+    /// Always off.
+    Off,
+}
+
+/// Numerical choices.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Numerics {
+    /// Spatial operators.
+    pub operators: Operators,
+    /// Smoothing length over particle spacing.
+    pub smoothing_ratio: f64,
+    /// Strength `xi` of the velocity filter.
+    pub velocity_filter: f64,
+    /// Pore-pressure diffusion.
+    pub diffusion: Diffusion,
+    /// Acceleration term of Eq. 7.
+    pub acceleration_term: AccelerationTerm,
+    /// Strain since the last geometry at which lists and weights are rebuilt.
+    pub geometry_strain_limit: f64,
+    /// Integrator of the sand model.
+    pub integrator: sandboil_soil::Integrator,
+}
+
+/// A complete description of the section.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// Particle spacing in x and y, m.
+    pub spacing: Vec2,
+    /// Velocity nodes, m.
+    pub position: Vec<Vec2>,
+    /// Region of each velocity node.
+    pub region: Vec<u32>,
+    /// The regions.
+    pub regions: Vec<Region>,
+    /// Elevation of the ground surface above each velocity node, m.
+    pub surface_elevation: Vec<f64>,
+    /// Vertical effective stress of the geostatic start at each stress node, kPa, compression positive. Stress
+    /// nodes `2 i` and `2 i + 1` belong to velocity node `i`, at plus and minus [`stress_node_offset`].
+    pub vertical_effective_stress: Vec<f64>,
+    /// Hydrostatic pore pressure at each velocity node, kPa; read only when there is water.
+    pub pore_pressure: Vec<f64>,
+    /// Pore water, if the section has any.
+    pub water: Option<Water>,
+    /// Gravity, m/s2.
+    pub gravity: f64,
+    /// Width of the periodic section, if its sides are periodic.
+    pub period: Option<Period>,
+    /// Elevation of the base, m.
+    pub base_elevation: f64,
+    /// Numerical choices.
+    pub numerics: Numerics,
+}
+
+/// Offset of a node's first stress node; the second lies opposite (Section 3, Fig. 1).
+pub fn stress_node_offset(spacing: Vec2) -> Vec2 {
+    spacing * (STRESS_NODE_DISTANCE * std::f64::consts::FRAC_1_SQRT_2)
+}
+
+impl Model {
+    /// Number of velocity nodes.
+    pub fn nodes(&self) -> usize {
+        self.position.len()
+    }
+
+    /// Length that stands for the particle spacing where only one is meant, m.
+    pub fn mean_spacing(&self) -> f64 {
+        (self.spacing.x * self.spacing.y).sqrt()
+    }
+
+    /// Smoothing length, m.
+    pub fn smoothing_length(&self) -> f64 {
+        self.numerics.smoothing_ratio * self.mean_spacing()
+    }
+
+    /// Mixture density of a region, Mg/m3: `(1 - n) rho_s + n rho_f`, dry without water.
+    pub fn mixture_density(&self, region: usize) -> f64 {
+        let Region { porosity, solid_density, .. } = self.regions[region];
+        let water = self.water.map_or(0.0, |water| porosity * water.unit_weight / self.gravity);
+        (1.0 - porosity) * solid_density + water
+    }
+
+    /// Stiffness `K_f / n` of the pore water in undrained compression, kPa; zero without water.
+    pub fn water_stiffness(&self, region: usize) -> f64 {
+        self.water.map_or(0.0, |water| water.bulk_modulus / self.regions[region].porosity)
+    }
+
+    /// Pressure diffusivity `kappa = k / C` of a region, m2/s, with the storage `C = n gamma_f / K_f` of Eq. 3.
+    pub fn pressure_diffusivity(&self, region: usize) -> f64 {
+        self.water.map_or(0.0, |water| {
+            self.regions[region].hydraulic_conductivity * self.water_stiffness(region) / water.unit_weight
+        })
+    }
+
+    /// Checks every array and number.
+    ///
+    /// # Errors
+    /// [`SolverError::Shape`] or [`SolverError::InvalidInput`] with the first contradiction found.
+    pub fn validate(&self) -> Result<(), SolverError> {
+        let nodes = self.nodes();
+        let shapes = [
+            ("region", self.region.len(), nodes),
+            ("surface_elevation", self.surface_elevation.len(), nodes),
+            ("vertical_effective_stress", self.vertical_effective_stress.len(), STRESS_NODES * nodes),
+            ("pore_pressure", self.pore_pressure.len(), if self.water.is_some() { nodes } else { 0 }),
+        ];
+        for (name, found, expected) in shapes {
+            if found != expected {
+                return Err(SolverError::Shape { name, found, expected });
+            }
+        }
+        let positive = |name, value: f64| {
+            let allowed = value.is_finite() && value > 0.0;
+            if allowed {
+                Ok(())
+            } else {
+                Err(SolverError::InvalidInput { name, value, expected: "positive" })
+            }
+        };
+        positive("nodes", nodes as f64)?;
+        positive("spacing.x", self.spacing.x)?;
+        positive("spacing.y", self.spacing.y)?;
+        positive("gravity", self.gravity)?;
+        positive("smoothing_ratio", self.numerics.smoothing_ratio)?;
+        positive("geometry_strain_limit", self.numerics.geometry_strain_limit)?;
+        if let Some(water) = self.water {
+            positive("water.unit_weight", water.unit_weight)?;
+            positive("water.bulk_modulus", water.bulk_modulus)?;
+        }
+        if let Some(period) = self.period {
+            positive("period", period.width)?;
+        }
+        for region in &self.regions {
+            if !(region.porosity > 0.0 && region.porosity < 1.0) {
+                return Err(SolverError::InvalidInput {
+                    name: "porosity",
+                    value: region.porosity,
+                    expected: "in (0, 1)",
+                });
+            }
+            positive("solid_density", region.solid_density)?;
+            positive("earth_pressure_coefficient", region.earth_pressure_coefficient)?;
+            if !(region.hydraulic_conductivity >= 0.0 && region.hydraulic_conductivity.is_finite()) {
+                let (name, value) = ("hydraulic_conductivity", region.hydraulic_conductivity);
+                return Err(SolverError::InvalidInput { name, value, expected: "zero or positive" });
+            }
+        }
+        if let Some(&region) = self.region.iter().find(|&&region| region as usize >= self.regions.len()) {
+            let (name, value) = ("region", f64::from(region));
+            return Err(SolverError::InvalidInput { name, value, expected: "an index of the regions" });
+        }
+        finite("position", self.position.iter().flat_map(|x| [x.x, x.y]))?;
+        finite("surface_elevation", self.surface_elevation.iter().copied())?;
+        finite("vertical_effective_stress", self.vertical_effective_stress.iter().copied())?;
+        finite("pore_pressure", self.pore_pressure.iter().copied())
+    }
+}
+
+fn finite(name: &'static str, mut values: impl Iterator<Item = f64>) -> Result<(), SolverError> {
+    match values.find(|value| !value.is_finite()) {
+        Some(value) => Err(SolverError::InvalidInput { name, value, expected: "finite" }),
+        None => Ok(()),
+    }
+}

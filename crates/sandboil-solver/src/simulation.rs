@@ -1,0 +1,985 @@
+//! Stages and stepping: the leapfrog loop, the gravity relaxation and the switch between them.
+
+use crate::{
+    base::{CompliantBase, UpgoingWave, base_points},
+    error::SolverError,
+    flow::{Flow, FlowScheme},
+    geometry::{Geometry, Wall, consistent_gradient, point_weights, stress_node_positions},
+    model::{AccelerationTerm, Diffusion, Model, Operators, STRESS_NODES, Soil},
+    parallel::{Rows, chunks, for_each_chunk},
+    record::{Probes, Recorder},
+    skeleton::{
+        Filter, NodalShare, PrintedStress, StressPoint, conservative_force, maximum_shear_strain, motion,
+    },
+    soil_field::SoilField,
+    timestep::{Criterion, PressureCoupling, PressureSpectrum, region_limit},
+};
+use sandboil_soil::{Stress, UpdateReport};
+use sandboil_sph::Vec2;
+
+/// Steps between checks of stability limit, geometry and finiteness.
+const CHECK_INTERVAL: u64 = 16;
+/// Time-step factor of the gravity stage: kinetic damping needs no margin for stiffening.
+const RELAXATION_FACTOR: f64 = 0.85;
+/// Default factor in shaking: soil stiffens in cycles between checks.
+pub const SHAKING_FACTOR: f64 = 0.6;
+/// The step shrinks when it exceeds its target by this factor, and grows when it falls below by the second.
+const SHRINK_AT: f64 = 1.1;
+/// See [`SHRINK_AT`].
+const GROW_AT: f64 = 1.3;
+/// Implicit diffusion is chosen where it lengthens the step by more than this.
+const IMPLICIT_GAIN: f64 = 1.2;
+/// Largest conductivity for the acceleration term of Eq. 7 when it is left to us, m/s: above, it limits dt.
+const ACCELERATION_TERM_CONDUCTIVITY: f64 = 3e-3;
+/// Speed no soil particle reaches, m/s: a run that does has diverged.
+const RUNAWAY_SPEED: f64 = 1e3;
+/// Mean over largest unbalanced acceleration that the gravity stage asks for.
+const MEAN_RESIDUAL: f64 = 0.1;
+
+/// Static stage: gravity on a fixed base, relaxed by kinetic damping.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gravity {
+    /// Largest unbalanced acceleration over gravity at the end.
+    pub tolerance: f64,
+    /// Steps after which the stage gives up.
+    pub max_steps: u64,
+}
+
+/// Dynamic stage on a compliant base.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shaking {
+    /// Duration, s.
+    pub duration: f64,
+    /// Upgoing wave at the base, if any.
+    pub wave: Option<UpgoingWave>,
+    /// Shear-wave speed (m/s) and density (Mg/m3) of the half-space, instead of the layer's own.
+    pub half_space: Option<(f64, f64)>,
+    /// Local damping `xi_l` of Eq. 16.
+    pub local_damping: f64,
+    /// Factor on the stability limit.
+    pub time_step_factor: f64,
+    /// Points where histories are read, m.
+    pub probes: Vec<Vec2>,
+    /// Interval of the histories, s.
+    pub history_interval: f64,
+    /// Whether probes also read stress and strain.
+    pub stress_histories: bool,
+    /// Whether the largest excess pressure of every node is kept.
+    pub pressure_envelope: bool,
+    /// Whether the largest shear strain of every stress node is kept.
+    pub strain_envelope: bool,
+}
+
+/// Work done, by kind: what a scene does not ask for stays zero.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Counters {
+    /// Steps of all stages.
+    pub steps: u64,
+    /// Calls of the flow model.
+    pub flow_calls: u64,
+    /// Calls of the base dashpots.
+    pub base_calls: u64,
+    /// Updates of plastic soil models.
+    pub plastic_updates: u64,
+    /// Geometries built.
+    pub geometry_builds: u64,
+    /// Changes of the time step.
+    pub time_step_changes: u64,
+    /// What the soil models counted.
+    pub soil: UpdateReport,
+}
+
+#[derive(Debug)]
+enum Active {
+    None,
+    Gravity { stage: Gravity, kinetic_energy: f64, residual: f64, at_rest: bool },
+    Shaking(Box<ActiveShaking>),
+}
+
+#[derive(Debug)]
+struct ActiveShaking {
+    stage: Shaking,
+    base: CompliantBase,
+    coupling: PressureCoupling,
+    probes: Probes,
+    recorder: Recorder,
+    channel_values: Vec<f64>,
+    pressure_envelope: Option<Vec<f64>>,
+    strain_envelope: Option<Vec<f64>>,
+    reference_strain: Vec<[f64; 3]>,
+}
+
+/// Result of one chunk of the velocity update.
+#[derive(Debug, Clone, Copy, Default)]
+struct MotionSum {
+    kinetic_energy: f64,
+    acceleration: f64,
+    largest_acceleration: f64,
+}
+
+/// A section and its state. Every array that leaves is in the user's node order.
+#[derive(Debug)]
+pub struct Simulation {
+    model: Model,
+    /// User's index of each internal node.
+    order: Vec<usize>,
+    threads: usize,
+    pool: Option<rayon::ThreadPool>,
+    geometry: Geometry,
+    wall: Wall,
+    initial_position: Vec<Vec2>,
+    position: Vec<Vec2>,
+    velocity: Vec<Vec2>,
+    acceleration: Vec<Vec2>,
+    mass: Vec<f64>,
+    dry_density: Vec<f64>,
+    points: Vec<StressPoint>,
+    shares: Vec<NodalShare>,
+    soil: SoilField,
+    constant_force: Vec<Vec2>,
+    spectrum: PressureSpectrum,
+    flow: Option<Flow>,
+    printed_stress: Option<PrintedStress>,
+    active: Active,
+    time: f64,
+    step: u64,
+    dt: f64,
+    criterion: Criterion,
+    counters: Counters,
+    sums: Vec<MotionSum>,
+    unit: Vec<()>,
+}
+
+impl Simulation {
+    /// Builds the section at its geostatic stress, at rest on a fixed base.
+    ///
+    /// # Errors
+    /// Bad input, or a thread pool that cannot be made.
+    pub fn new(model: Model, threads: usize) -> Result<Self, SolverError> {
+        model.validate()?;
+        let (model, order) = sorted(&model);
+        let nodes = model.nodes();
+        let pool = (threads > 1)
+            .then(|| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
+            .transpose()
+            .map_err(|error| SolverError::Threads { threads, reason: error.to_string() })?;
+        let geometry = Geometry::build(&model, &model.position, Wall::NO_SLIP, None);
+        let volume = model.spacing.x * model.spacing.y;
+        let density = |&region: &u32| model.mixture_density(region as usize);
+        let mut points: Vec<StressPoint> = (0..STRESS_NODES * nodes)
+            .map(|s| {
+                let region = &model.regions[model.region[s / STRESS_NODES] as usize];
+                let vertical = -model.vertical_effective_stress[s];
+                let lateral = region.earth_pressure_coefficient * vertical;
+                let stress = Stress { xx: lateral, yy: vertical, xy: 0.0, zz: lateral };
+                StressPoint {
+                    stress,
+                    density: density(&model.region[s / STRESS_NODES]),
+                    ..StressPoint::default()
+                }
+            })
+            .collect();
+        let soil = SoilField::elastic(&model, &mut points)?;
+        Ok(Self {
+            order,
+            threads,
+            pool,
+            wall: Wall::NO_SLIP,
+            initial_position: model.position.clone(),
+            position: model.position.clone(),
+            velocity: vec![Vec2::zeros(); nodes],
+            acceleration: vec![Vec2::zeros(); nodes],
+            mass: model.region.iter().map(|region| density(region) * volume).collect(),
+            dry_density: model
+                .region
+                .iter()
+                .map(|&r| {
+                    (1.0 - model.regions[r as usize].porosity) * model.regions[r as usize].solid_density
+                })
+                .collect(),
+            shares: vec![NodalShare::default(); points.len()],
+            points,
+            soil,
+            constant_force: vec![Vec2::zeros(); nodes],
+            spectrum: PressureSpectrum::new(&model),
+            flow: None,
+            printed_stress: geometry.printed.as_ref().map(|_| PrintedStress::default()),
+            geometry,
+            active: Active::None,
+            time: 0.0,
+            step: 0,
+            dt: 0.0,
+            criterion: Criterion::default(),
+            counters: Counters { geometry_builds: 1, ..Counters::default() },
+            sums: vec![MotionSum::default(); chunks(nodes)],
+            unit: vec![(); nodes],
+            model,
+        })
+    }
+
+    /// Begins the static stage: soil elastic, pore pressure frozen, base fixed.
+    ///
+    /// # Errors
+    /// Elastic constants outside their range.
+    pub fn begin_gravity(&mut self, stage: Gravity) -> Result<(), SolverError> {
+        self.set_wall(Wall::NO_SLIP);
+        self.soil = SoilField::elastic(&self.model, &mut self.points)?;
+        self.flow = None;
+        let gravity = Vec2::new(0.0, -self.model.gravity);
+        self.constant_force = self.mass.iter().map(|mass| gravity * *mass).collect();
+        if self.model.water.is_some() {
+            let volume = self.model.spacing.x * self.model.spacing.y;
+            let gradient = consistent_gradient(&self.model, &self.position, &self.model.pore_pressure);
+            for (force, gradient) in self.constant_force.iter_mut().zip(gradient) {
+                *force -= gradient * volume;
+            }
+        }
+        (self.dt, self.criterion) = self.limit(PressureCoupling::None, RELAXATION_FACTOR);
+        self.begin(Active::Gravity { stage, kinetic_energy: 0.0, residual: f64::INFINITY, at_rest: false });
+        self.refresh_shares();
+        Ok(())
+    }
+
+    /// Begins shaking: sand becomes plastic, the base compliant, and whatever force the new base and the state
+    /// at rest leave unbalanced is stored as a constant nodal reaction, so that nothing moves until a wave comes.
+    ///
+    /// # Errors
+    /// A soil model that refuses the stress it is given.
+    pub fn begin_shaking(&mut self, stage: Shaking) -> Result<(), SolverError> {
+        for (name, value, allowed) in [
+            ("duration", stage.duration, stage.duration > 0.0 && stage.duration.is_finite()),
+            ("time_step_factor", stage.time_step_factor, stage.time_step_factor > 0.0),
+            ("history_interval", stage.history_interval, stage.history_interval > 0.0),
+        ] {
+            if !allowed {
+                return Err(SolverError::InvalidInput { name, value, expected: "positive" });
+            }
+        }
+        self.set_wall(match self.model.numerics.operators {
+            Operators::Conservative => Wall::TRACTION,
+            Operators::Printed => Wall::FREE_SLIP,
+        });
+        self.velocity.fill(Vec2::zeros());
+        self.acceleration.fill(Vec2::zeros());
+        for point in &mut self.points {
+            point.strain = [0.0; 3];
+        }
+        self.soil = SoilField::plastic(&self.model, &mut self.points)?;
+        let impedance = self.base_impedance(stage.half_space);
+        let base = CompliantBase::new(&self.model, &self.position, &self.mass, impedance, stage.wave.clone());
+        let scheme = self.flow_scheme(stage.time_step_factor);
+        self.flow = Flow::new(&self.model, scheme);
+        let coupling = match (&self.flow, scheme) {
+            (None, _) => PressureCoupling::None,
+            (_, FlowScheme::Implicit) => PressureCoupling::Implicit,
+            _ => PressureCoupling::Explicit,
+        };
+        (self.dt, self.criterion) = self.limit(coupling, stage.time_step_factor);
+        let stress_position = stress_node_positions(&self.position, self.model.spacing);
+        let probes = Probes {
+            velocity: point_weights(&self.model, &self.position, &stage.probes),
+            stress: if stage.stress_histories {
+                point_weights(&self.model, &stress_position, &stage.probes)
+            } else {
+                sandboil_sph::Csr::default()
+            },
+        };
+        let channels = stage.probes.len() * channel_names(self.flow.is_some(), stage.stress_histories).len();
+        self.begin(Active::Shaking(Box::new(ActiveShaking {
+            recorder: Recorder::new(channels, stage.history_interval, self.dt),
+            channel_values: vec![0.0; channels],
+            pressure_envelope: (stage.pressure_envelope && self.flow.is_some())
+                .then(|| vec![0.0; self.model.nodes()]),
+            strain_envelope: stage.strain_envelope.then(|| vec![0.0; self.points.len()]),
+            reference_strain: vec![[0.0; 3]; self.points.len()],
+            base,
+            coupling,
+            probes,
+            stage,
+        })));
+        self.refresh_shares();
+        self.store_reaction();
+        Ok(())
+    }
+
+    /// Makes the present state one of rest: the constant forces balance whatever stress and pressure leave over.
+    fn store_reaction(&mut self) {
+        self.prepare_printed_stress();
+        let reaction: Vec<Vec2> =
+            (0..self.model.nodes()).map(|j| -self.internal_force(j, Vec2::zeros())).collect();
+        self.constant_force = reaction;
+    }
+
+    /// Gives the section an excess pore pressure (kPa, user's node order) before the first step of shaking, held
+    /// in balance by a load that stays: the start of consolidation under a load just put on.
+    ///
+    /// # Errors
+    /// A dry section, a stage that has begun to move, or an array of the wrong length.
+    pub fn set_excess_pore_pressure(&mut self, excess: &[f64]) -> Result<(), SolverError> {
+        let (found, expected) = (excess.len(), self.model.nodes());
+        if found != expected {
+            return Err(SolverError::Shape { name: "excess_pore_pressure", found, expected });
+        }
+        let (Active::Shaking(_), 0, Some(flow)) = (&self.active, self.step, &mut self.flow) else {
+            return Err(SolverError::Order {
+                call: "set_excess_pore_pressure",
+                needs: "water and a shaking stage that has just begun",
+            });
+        };
+        for (slot, &user) in flow.excess.iter_mut().zip(&self.order) {
+            *slot = excess[user];
+        }
+        self.store_reaction();
+        Ok(())
+    }
+
+    fn begin(&mut self, active: Active) {
+        self.active = active;
+        self.time = 0.0;
+        self.step = 0;
+    }
+
+    fn set_wall(&mut self, wall: Wall) {
+        if wall != self.wall {
+            self.wall = wall;
+            self.rebuild_geometry();
+        }
+    }
+
+    fn rebuild_geometry(&mut self) {
+        // The tables are replaced as a whole; the lists of the old ones serve while no node left their skin.
+        let previous = self.geometry.clone();
+        self.geometry = Geometry::build(&self.model, &self.position, self.wall, Some(previous));
+        if let Some(flow) = &mut self.flow {
+            flow.geometry_changed();
+        }
+        self.counters.geometry_builds += 1;
+    }
+
+    /// Fills the force loop's shares from the present stress and velocity.
+    fn refresh_shares(&mut self) {
+        let filter = self.filter();
+        for s in 0..self.points.len() {
+            let motion = motion(&self.geometry, s, &self.velocity);
+            self.shares[s] = motion.share(&self.points[s], self.geometry.covariance[s], filter);
+        }
+    }
+
+    fn filter(&self) -> Filter {
+        Filter {
+            strength: self.model.numerics.velocity_filter / self.model.mean_spacing(),
+            volume: self.model.spacing.x * self.model.spacing.y / STRESS_NODES as f64,
+        }
+    }
+
+    fn flow_scheme(&self, factor: f64) -> FlowScheme {
+        let numerics = self.model.numerics;
+        let conductivity = self.model.regions.iter().map(|r| r.hydraulic_conductivity).fold(0.0, f64::max);
+        if conductivity == 0.0 {
+            return FlowScheme::Undrained;
+        }
+        let implicit = match numerics.diffusion {
+            Diffusion::Implicit => true,
+            Diffusion::Explicit => false,
+            Diffusion::Auto => {
+                let limit = |coupling| self.limit(coupling, factor).0;
+                limit(PressureCoupling::Implicit) > IMPLICIT_GAIN * limit(PressureCoupling::Explicit)
+            }
+        };
+        let acceleration = match numerics.acceleration_term {
+            AccelerationTerm::On => true,
+            AccelerationTerm::Off => false,
+            AccelerationTerm::Auto => conductivity <= ACCELERATION_TERM_CONDUCTIVITY,
+        };
+        match (implicit, acceleration) {
+            (true, _) => FlowScheme::Implicit,
+            (false, true) => FlowScheme::ExplicitWithAcceleration,
+            (false, false) => FlowScheme::Explicit,
+        }
+    }
+
+    /// Time step at `factor` of the limit of the present stiffness.
+    fn limit(&self, coupling: PressureCoupling, factor: f64) -> (f64, Criterion) {
+        let mut stiffest = vec![0.0_f64; self.model.regions.len()];
+        for (s, point) in self.points.iter().enumerate() {
+            let slot = &mut stiffest[self.model.region[s / STRESS_NODES] as usize];
+            *slot = slot.max(point.stiffness);
+        }
+        let (dt, criterion) = stiffest
+            .iter()
+            .enumerate()
+            .filter(|(_, stiffness)| **stiffness > 0.0)
+            .map(|(region, &stiffness)| {
+                region_limit(&self.model, region, stiffness, coupling, &self.spectrum)
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .unwrap_or_default();
+        (factor * dt, criterion)
+    }
+
+    /// `rho_m C_s` of the layer above each base point, from the model's small-strain modulus at the base's
+    /// stress, or of the half-space that was given.
+    fn base_impedance(&self, half_space: Option<(f64, f64)>) -> Vec<f64> {
+        let points = base_points(&self.model, &self.position);
+        if let Some((speed, density)) = half_space {
+            return vec![density * speed; points.len()];
+        }
+        let stress_position = stress_node_positions(&self.position, self.model.spacing);
+        let weights = point_weights(&self.model, &stress_position, &points);
+        let lowest = (0..self.model.nodes())
+            .filter(|&node| self.position[node].y - self.model.base_elevation < self.model.spacing.y);
+        lowest
+            .enumerate()
+            .map(|(point, node)| {
+                let region = self.model.region[node] as usize;
+                let density = self.model.mixture_density(region);
+                let at_base = |component: &dyn Fn(&Stress) -> f64| -> f64 {
+                    weights.iter_row(point).map(|(s, w)| w * component(&self.points[s].stress)).sum()
+                };
+                let stress = Stress {
+                    xx: at_base(&|s| s.xx),
+                    yy: at_base(&|s| s.yy),
+                    xy: at_base(&|s| s.xy),
+                    zz: at_base(&|s| s.zz),
+                };
+                let modulus = match &self.model.regions[region].soil {
+                    Soil::Elastic(elastic) => elastic.moduli().shear,
+                    Soil::PM4Sand(sand) => sand.small_strain_shear_modulus(&stress),
+                };
+                (density * modulus).sqrt()
+            })
+            .collect()
+    }
+
+    fn prepare_printed_stress(&mut self) {
+        if let (Some(stress), Some(tables)) = (&mut self.printed_stress, &self.geometry.printed) {
+            stress.update(tables, &self.points, self.wall == Wall::FREE_SLIP);
+        }
+    }
+
+    /// Force on node `j`, moving at `velocity`, from stress and excess pore pressure (Eq. 6), kN/m.
+    #[inline]
+    fn internal_force(&self, j: usize, velocity: Vec2) -> Vec2 {
+        let volume = self.model.spacing.x * self.model.spacing.y;
+        let mut force = match (&self.printed_stress, &self.geometry.printed) {
+            (Some(stress), Some(tables)) => stress.force(tables, j, &self.points, &self.dry_density, volume),
+            _ => conservative_force(
+                &self.geometry,
+                j,
+                velocity,
+                &self.shares,
+                &self.points,
+                volume / STRESS_NODES as f64,
+            ),
+        };
+        if let (Some(flow), Some(tables)) = (&self.flow, &self.geometry.flow) {
+            match &self.geometry.printed {
+                None => {
+                    for (i, weight) in tables.divergence.transposed.iter_row(j) {
+                        force += weight * flow.excess[i];
+                    }
+                }
+                Some(printed) => {
+                    for (i, gradient) in printed.pressure_gradient.iter_row(j) {
+                        force -= gradient * (flow.excess[i] * volume);
+                    }
+                }
+            }
+        }
+        force
+    }
+
+    /// Advances by at most `steps` steps, or until the stage time reaches `until`. Returns whether the stage is
+    /// complete.
+    ///
+    /// # Errors
+    /// [`SolverError::Diverged`], [`SolverError::Soil`], [`SolverError::NotAtRest`]; the state stays readable.
+    pub fn advance(&mut self, steps: u64, until: f64) -> Result<bool, SolverError> {
+        if matches!(self.active, Active::None) {
+            return Err(SolverError::Order { call: "advance", needs: "a stage" });
+        }
+        let pool = self.pool.take();
+        let outcome = match &pool {
+            Some(pool) => pool.install(|| self.run(steps, until)),
+            None => self.run(steps, until),
+        };
+        self.pool = pool;
+        outcome
+    }
+
+    fn run(&mut self, steps: u64, until: f64) -> Result<bool, SolverError> {
+        for _ in 0..steps {
+            if self.is_complete() {
+                return Ok(true);
+            }
+            // Half a step of tolerance: output never changes the time step.
+            if self.time + 0.5 * self.dt >= until {
+                return Ok(false);
+            }
+            match self.active {
+                Active::Gravity { .. } => self.gravity_step()?,
+                _ => self.shaking_step()?,
+            }
+        }
+        Ok(self.is_complete())
+    }
+
+    /// Whether the stage has reached its end.
+    pub fn is_complete(&self) -> bool {
+        match &self.active {
+            Active::None => true,
+            Active::Gravity { at_rest, .. } => *at_rest,
+            Active::Shaking(shaking) => self.is_over(shaking),
+        }
+    }
+
+    fn is_over(&self, shaking: &ActiveShaking) -> bool {
+        self.time + 0.5 * self.dt >= shaking.stage.duration
+    }
+
+    /// Forces and accelerations, and velocities moved by them over `dt`; positions stay.
+    fn accelerate(&mut self, dt: f64, local_damping: f64) {
+        self.prepare_printed_stress();
+        let mut velocity = std::mem::take(&mut self.velocity);
+        let mut acceleration = std::mem::take(&mut self.acceleration);
+        let mut sums = std::mem::take(&mut self.sums);
+        let mut unit = std::mem::take(&mut self.unit);
+        let threaded = self.threads > 1;
+        let rows = Rows { a: &mut velocity, b: &mut acceleration, c: &mut unit };
+        let this = &*self;
+        for_each_chunk(threaded, rows, &mut sums, |first, rows, sum| {
+            *sum = MotionSum::default();
+            for (k, (v, a)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
+                let j = first + k;
+                let mass = this.mass[j];
+                // The constant force comes last, so that a state at rest cancels to the last bit.
+                let mut acting = (this.internal_force(j, *v) + this.constant_force[j]) / mass;
+                if local_damping > 0.0 {
+                    // Eq. 16.
+                    acting -= acting.abs().component_mul(&v.map(sign)) * local_damping;
+                }
+                *a = acting;
+                *v += acting * dt;
+                let size = acting.norm();
+                sum.kinetic_energy += 0.5 * mass * v.norm_squared();
+                sum.acceleration += size;
+                sum.largest_acceleration = sum.largest_acceleration.max(size);
+            }
+        });
+        (self.velocity, self.acceleration, self.sums, self.unit) = (velocity, acceleration, sums, unit);
+    }
+
+    /// Strain, soil model and the shares of the next force loop, from the velocity at mid-step.
+    fn update_stress(&mut self, dt: f64) -> Result<(), SolverError> {
+        let filter = self.filter();
+        let report = self.soil.step(
+            self.threads > 1,
+            &self.geometry,
+            &self.velocity,
+            (&mut self.points, &mut self.shares),
+            (filter, dt),
+            &self.model.numerics.integrator,
+        );
+        let report = report.map_err(|error| match error {
+            SolverError::Soil { node, .. } => self.diverged("soil state", node, f64::NAN),
+            other => other,
+        })?;
+        self.counters.soil.merge(&report);
+        self.counters.plastic_updates += self.soil.plastic_points() as u64;
+        self.counters.steps += 1;
+        Ok(())
+    }
+
+    fn gravity_step(&mut self) -> Result<(), SolverError> {
+        let dt = self.dt;
+        let Active::Gravity { kinetic_energy, .. } = self.active else { return Ok(()) };
+        // From rest the first kick of a leapfrog spans half a step; a whole one would let modes near the
+        // stability limit flip for ever between two stops.
+        self.accelerate(if kinetic_energy == 0.0 { 0.5 * dt } else { dt }, 0.0);
+        // Chunk sums are added in order, whatever thread made them.
+        let sum = self.sums.iter().fold(MotionSum::default(), |total, chunk| MotionSum {
+            kinetic_energy: total.kinetic_energy + chunk.kinetic_energy,
+            acceleration: total.acceleration + chunk.acceleration,
+            largest_acceleration: total.largest_acceleration.max(chunk.largest_acceleration),
+        });
+        let largest = sum.largest_acceleration / self.model.gravity;
+        let mean = sum.acceleration / (self.model.gravity * self.model.nodes() as f64);
+        self.check_finite("acceleration", |simulation, j| simulation.acceleration[j].norm(), f64::INFINITY)?;
+        let Active::Gravity { stage, kinetic_energy, residual, at_rest } = &mut self.active else {
+            return Ok(());
+        };
+        *residual = largest;
+        if largest <= stage.tolerance && mean <= MEAN_RESIDUAL * stage.tolerance {
+            *at_rest = true;
+            self.velocity.fill(Vec2::zeros());
+            return Ok(());
+        }
+        if self.step >= stage.max_steps {
+            let Gravity { tolerance, .. } = *stage;
+            return Err(SolverError::NotAtRest { steps: self.step, residual: largest, tolerance });
+        }
+        // Kinetic damping: at each peak of the kinetic energy all motion stops.
+        if sum.kinetic_energy < *kinetic_energy {
+            self.velocity.fill(Vec2::zeros());
+            *kinetic_energy = 0.0;
+        } else {
+            *kinetic_energy = sum.kinetic_energy;
+        }
+        self.update_stress(dt)?;
+        self.step += 1;
+        self.time += dt;
+        Ok(())
+    }
+
+    fn shaking_step(&mut self) -> Result<(), SolverError> {
+        // Moved out so that stage and section can be borrowed apart; moved back below, also on errors.
+        let Active::Shaking(mut shaking) = std::mem::replace(&mut self.active, Active::None) else {
+            return Ok(());
+        };
+        let outcome = self.shaking_step_with(&mut shaking);
+        self.active = Active::Shaking(shaking);
+        outcome
+    }
+
+    fn shaking_step_with(&mut self, shaking: &mut ActiveShaking) -> Result<(), SolverError> {
+        let dt = self.dt;
+        shaking.base.begin_step(&self.velocity);
+        self.accelerate(dt, shaking.stage.local_damping);
+        shaking.base.end_step(self.time, dt, &self.mass, &mut self.velocity, &mut self.acceleration);
+        self.counters.base_calls += 1;
+        self.record(shaking);
+        for (x, v) in self.position.iter_mut().zip(&self.velocity) {
+            *x += v * dt;
+        }
+        self.update_stress(dt)?;
+        if let (Some(flow), Some(tables)) = (&mut self.flow, &self.geometry.flow) {
+            self.counters.flow_calls += 1;
+            if !flow.step(tables, &self.velocity, &self.acceleration, dt) {
+                return Err(self.diverged("pore pressure matrix", 0, f64::NAN));
+            }
+        }
+        self.step += 1;
+        self.time += dt;
+        if self.is_over(shaking) {
+            shaking.recorder.finish(self.time);
+        }
+        if self.step.is_multiple_of(CHECK_INTERVAL) {
+            self.check(shaking)?;
+        }
+        Ok(())
+    }
+
+    /// Finiteness, stability limit and geometry, every few steps.
+    fn check(&mut self, shaking: &mut ActiveShaking) -> Result<(), SolverError> {
+        self.check_finite("velocity", |simulation, j| simulation.velocity[j].norm(), RUNAWAY_SPEED)?;
+        if let Some(flow) = &self.flow
+            && let Some(j) = flow.excess.iter().position(|p| !p.is_finite())
+        {
+            let value = flow.excess[j];
+            return Err(self.diverged("pore pressure", j, value));
+        }
+        let (target, criterion) = self.limit(shaking.coupling, shaking.stage.time_step_factor);
+        if self.dt > SHRINK_AT * target || self.dt * GROW_AT < target {
+            (self.dt, self.criterion) = (target, criterion);
+            self.counters.time_step_changes += 1;
+        }
+        let limit = self.model.numerics.geometry_strain_limit;
+        let outgrown = |(point, reference): (&StressPoint, &[f64; 3])| {
+            point.strain.iter().zip(reference).any(|(now, then)| (now - then).abs() > limit)
+        };
+        if self.points.iter().zip(&shaking.reference_strain).any(outgrown) {
+            for (reference, point) in shaking.reference_strain.iter_mut().zip(&self.points) {
+                *reference = point.strain;
+            }
+            self.rebuild_geometry();
+            self.refresh_shares();
+        }
+        Ok(())
+    }
+
+    /// Envelopes and histories at the beginning of the step, when the accelerations are known and nothing has
+    /// moved yet: every quantity of a sample belongs to the same instant.
+    fn record(&self, shaking: &mut ActiveShaking) {
+        if let (Some(envelope), Some(flow)) = (&mut shaking.pressure_envelope, &self.flow) {
+            for (largest, &excess) in envelope.iter_mut().zip(&flow.excess) {
+                *largest = largest.max(excess);
+            }
+        }
+        if let Some(envelope) = &mut shaking.strain_envelope {
+            for (largest, point) in envelope.iter_mut().zip(&self.points) {
+                *largest = largest.max(maximum_shear_strain(point.strain));
+            }
+        }
+        let values = &mut shaking.channel_values;
+        let mut slot = 0;
+        let mut put = |value: f64| {
+            values[slot] = value;
+            slot += 1;
+        };
+        for probe in 0..shaking.stage.probes.len() {
+            let mut acceleration = Vec2::zeros();
+            let (mut velocity, mut displacement) = (Vec2::zeros(), Vec2::zeros());
+            let mut excess = 0.0;
+            for (j, &weight) in shaking.probes.velocity.iter_row(probe) {
+                acceleration += self.acceleration[j] * weight;
+                velocity += (self.velocity[j] - self.acceleration[j] * (0.5 * self.dt)) * weight;
+                displacement += (self.position[j] - self.initial_position[j]) * weight;
+                excess += self.flow.as_ref().map_or(0.0, |flow| flow.excess[j]) * weight;
+            }
+            for vector in [acceleration, velocity, displacement] {
+                put(vector.x);
+                put(vector.y);
+            }
+            if self.flow.is_some() {
+                put(excess);
+            }
+            if shaking.stage.stress_histories {
+                let mut sum = [0.0; 6];
+                for (s, weight) in shaking.probes.stress.iter_row(probe) {
+                    let StressPoint { stress, strain, .. } = &self.points[s];
+                    let read = [stress.xx, stress.yy, stress.xy, strain[0], strain[1], strain[2]];
+                    for (total, value) in sum.iter_mut().zip(read) {
+                        *total += weight * value;
+                    }
+                }
+                sum.into_iter().for_each(&mut put);
+            }
+        }
+        shaking.recorder.push(self.time, self.dt, values);
+    }
+
+    fn check_finite(
+        &self,
+        quantity: &'static str,
+        value: impl Fn(&Self, usize) -> f64,
+        bound: f64,
+    ) -> Result<(), SolverError> {
+        for j in 0..self.model.nodes() {
+            let found = value(self, j);
+            // NaN must take the error branch.
+            if !(found <= bound) || found == f64::INFINITY {
+                return Err(self.diverged(quantity, j, found));
+            }
+        }
+        Ok(())
+    }
+
+    fn diverged(&self, quantity: &'static str, j: usize, value: f64) -> SolverError {
+        SolverError::Diverged {
+            quantity,
+            node: self.order[j],
+            x: self.position[j].x,
+            y: self.position[j].y,
+            value,
+            time: self.time,
+            step: self.step,
+        }
+    }
+
+    /// Time in the stage, s.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Steps made in the stage.
+    pub fn step(&self) -> u64 {
+        self.step
+    }
+
+    /// Present time step, s, and what limits it.
+    pub fn time_step(&self) -> (f64, Criterion) {
+        (self.dt, self.criterion)
+    }
+
+    /// Largest unbalanced acceleration over gravity in the gravity stage; infinite before its first step.
+    pub fn residual(&self) -> f64 {
+        match self.active {
+            Active::Gravity { residual, .. } => residual,
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// Work done so far.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// How pore pressure is advanced in the stage, in the user's words.
+    pub fn flow_scheme_name(&self) -> &'static str {
+        self.flow.as_ref().map_or("none", Flow::scheme_name)
+    }
+
+    /// Number of velocity nodes.
+    pub fn nodes(&self) -> usize {
+        self.model.nodes()
+    }
+
+    /// Pairs between stress and velocity nodes, images folded.
+    pub fn pairs(&self) -> usize {
+        self.geometry.pairs()
+    }
+
+    /// Dashpot coefficients of the base points, kPa s/m; empty without a compliant base.
+    pub fn base_impedances(&self) -> Vec<f64> {
+        match &self.active {
+            Active::Shaking(shaking) => shaking.base.impedance().to_vec(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Names and bytes of the arrays that exist: what a scene did not ask for is not in the list.
+    pub fn arrays(&self) -> Vec<(&'static str, usize)> {
+        let nodes = self.model.nodes();
+        let mut arrays = vec![
+            ("motion", 5 * nodes * size_of::<Vec2>()),
+            ("stress", size_of_val(self.points.as_slice()) + size_of_val(self.shares.as_slice())),
+            ("geometry", self.geometry.bytes()),
+        ];
+        if let Some(flow) = &self.flow {
+            arrays.push(("pore_pressure", flow.bytes()));
+        }
+        if self.soil.plastic_points() > 0 {
+            arrays.push(("sand_state", self.soil.state_bytes()));
+        }
+        if let Some(printed) = &self.printed_stress {
+            arrays.push(("printed_stress", printed.bytes()));
+        }
+        if let Active::Shaking(shaking) = &self.active {
+            arrays.push(("base", shaking.base.bytes()));
+            if let Some(envelope) = &shaking.pressure_envelope {
+                arrays.push(("pressure_envelope", size_of_val(envelope.as_slice())));
+            }
+            if let Some(envelope) = &shaking.strain_envelope {
+                arrays.push(("strain_envelope", size_of_val(envelope.as_slice())));
+            }
+        }
+        arrays
+    }
+
+    fn in_user_order<T: Copy + Default>(&self, value: impl Fn(usize) -> T) -> Vec<T> {
+        let mut out = vec![T::default(); self.model.nodes()];
+        for (j, &user) in self.order.iter().enumerate() {
+            out[user] = value(j);
+        }
+        out
+    }
+
+    /// Positions without periodic wrapping (virtual coordinates), m: lateral sway is seen.
+    pub fn position(&self) -> Vec<[f64; 2]> {
+        self.in_user_order(|j| self.position[j].into())
+    }
+
+    /// Displacements since the section was built, m.
+    pub fn displacement(&self) -> Vec<[f64; 2]> {
+        self.in_user_order(|j| (self.position[j] - self.initial_position[j]).into())
+    }
+
+    /// Velocities at the middle of the last step, m/s.
+    pub fn velocity(&self) -> Vec<[f64; 2]> {
+        self.in_user_order(|j| self.velocity[j].into())
+    }
+
+    /// Accelerations of the last step, m/s2.
+    pub fn acceleration(&self) -> Vec<[f64; 2]> {
+        self.in_user_order(|j| self.acceleration[j].into())
+    }
+
+    /// Excess pore pressure since the stage began, kPa; `None` without water.
+    pub fn excess_pore_pressure(&self) -> Option<Vec<f64>> {
+        self.model.water?;
+        Some(self.in_user_order(|j| self.flow.as_ref().map_or(0.0, |flow| flow.excess[j])))
+    }
+
+    /// Effective stress `(xx, yy, xy, zz)` of every velocity node's two stress nodes, kPa, tension positive.
+    pub fn stress(&self) -> Vec<[[f64; 4]; STRESS_NODES]> {
+        self.in_user_order(|j| {
+            [0, 1].map(|k| {
+                let Stress { xx, yy, xy, zz } = self.points[STRESS_NODES * j + k].stress;
+                [xx, yy, xy, zz]
+            })
+        })
+    }
+
+    /// Strain `(xx, yy, engineering xy)` since the stage began of every velocity node's two stress nodes.
+    pub fn strain(&self) -> Vec<[[f64; 3]; STRESS_NODES]> {
+        self.in_user_order(|j| [0, 1].map(|k| self.points[STRESS_NODES * j + k].strain))
+    }
+
+    /// Largest excess pore pressure of every node since shaking began, kPa, if it is kept.
+    pub fn largest_excess_pore_pressure(&self) -> Option<Vec<f64>> {
+        let Active::Shaking(shaking) = &self.active else { return None };
+        let envelope = shaking.pressure_envelope.as_ref()?;
+        Some(self.in_user_order(|j| envelope[j]))
+    }
+
+    /// Largest engineering shear strain of every node since shaking began, if it is kept.
+    pub fn largest_shear_strain(&self) -> Option<Vec<f64>> {
+        let Active::Shaking(shaking) = &self.active else { return None };
+        let envelope = shaking.strain_envelope.as_ref()?;
+        Some(self.in_user_order(|j| envelope[STRESS_NODES * j].max(envelope[STRESS_NODES * j + 1])))
+    }
+
+    /// Names of the history channels of each probe, in the order of [`Simulation::take_histories`].
+    pub fn channel_names(&self) -> Vec<&'static str> {
+        match &self.active {
+            Active::Shaking(shaking) => channel_names(self.flow.is_some(), shaking.stage.stress_histories),
+            _ => Vec::new(),
+        }
+    }
+
+    /// History samples finished since the last call: times (s) and one row for each time, probe after probe.
+    pub fn take_histories(&mut self) -> (Vec<f64>, Vec<f64>) {
+        match &mut self.active {
+            Active::Shaking(shaking) => shaking.recorder.take(),
+            _ => (Vec::new(), Vec::new()),
+        }
+    }
+}
+
+/// History channels of one probe. Stress is effective, tension positive.
+fn channel_names(water: bool, stress: bool) -> Vec<&'static str> {
+    let mut names = vec![
+        "acceleration_x",
+        "acceleration_y",
+        "velocity_x",
+        "velocity_y",
+        "displacement_x",
+        "displacement_y",
+    ];
+    if water {
+        names.push("excess_pore_pressure");
+    }
+    if stress {
+        names.extend(["stress_xx", "stress_yy", "stress_xy", "strain_xx", "strain_yy", "gamma_xy"]);
+    }
+    names
+}
+
+/// Sign with zero for zero: a node at rest is not pushed by its damping.
+fn sign(value: f64) -> f64 {
+    if value == 0.0 { 0.0 } else { value.signum() }
+}
+
+/// The model with nodes sorted by region, then by row and column of the lattice, and the user's index of each:
+/// soil loops run over contiguous rows of one law, and neighbours lie near in memory.
+fn sorted(model: &Model) -> (Model, Vec<usize>) {
+    let row = |i: usize| ((model.position[i].y - model.base_elevation) / model.spacing.y).floor();
+    let mut order: Vec<usize> = (0..model.nodes()).collect();
+    order.sort_by(|&a, &b| {
+        let key = |i: usize| (model.region[i], row(i), model.position[i].x);
+        let ((ra, ya, xa), (rb, yb, xb)) = (key(a), key(b));
+        ra.cmp(&rb).then(ya.total_cmp(&yb)).then(xa.total_cmp(&xb)).then(a.cmp(&b))
+    });
+    let sorted = Model {
+        position: order.iter().map(|&i| model.position[i]).collect(),
+        region: order.iter().map(|&i| model.region[i]).collect(),
+        surface_elevation: order.iter().map(|&i| model.surface_elevation[i]).collect(),
+        vertical_effective_stress: order
+            .iter()
+            .flat_map(|&i| [0, 1].map(|k| model.vertical_effective_stress[STRESS_NODES * i + k]))
+            .collect(),
+        pore_pressure: order.iter().filter_map(|&i| model.pore_pressure.get(i).copied()).collect(),
+        ..model.clone()
+    };
+    (sorted, order)
+}

@@ -1,0 +1,334 @@
+//! Strain at the stress nodes and force at the velocity nodes: the mechanics of the soil skeleton.
+
+use crate::geometry::{Geometry, PrintedTables};
+use sandboil_soil::{StrainIncrement, Stress};
+use sandboil_sph::Vec2;
+
+/// What a stress node carries besides the state of its soil model.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StressPoint {
+    /// Effective stress, kPa, tension positive.
+    pub stress: Stress,
+    /// Total strain `(xx, yy, engineering xy)` since the stage began, tension positive.
+    pub strain: [f64; 3],
+    /// Current elastic shear modulus, kPa.
+    pub shear_modulus: f64,
+    /// Current skeleton stiffness `K + 4G/3`, kPa.
+    pub stiffness: f64,
+    /// Mixture density, Mg/m3.
+    pub density: f64,
+}
+
+/// What the force loop gathers from a stress node.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct NodalShare {
+    /// Volume times stress, less the linear part of the velocity filter: rows meet the gradient weight, kN/m.
+    tensor: [f64; 4],
+    /// Kernel-weighted mean velocity around the stress node, m/s.
+    mean_velocity: Vec2,
+    /// Filter coefficient `xi rho_m C_s / dx V_s`, kN s/m2.
+    filter: f64,
+}
+
+/// Strength of the velocity filter, resolved for one geometry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Filter {
+    /// `xi / dx`, 1/m.
+    pub strength: f64,
+    /// Volume of a stress node, m2.
+    pub volume: f64,
+}
+
+/// Least shear-wave speed of the filter, m/s: liquefied soil still needs its short waves damped.
+const LEAST_FILTER_SPEED: f64 = 20.0;
+
+/// Velocity gradient rows `grad v_x` and `grad v_y` at a stress node, walls included, with the mean velocity and
+/// the gradient before walls that the filter needs (Eq. 8 in least-squares form).
+pub struct Motion {
+    x: Vec2,
+    y: Vec2,
+    free_x: Vec2,
+    free_y: Vec2,
+    mean_velocity: Vec2,
+}
+
+/// Gathers the velocity field at stress node `s`.
+#[inline]
+pub fn motion(geometry: &Geometry, s: usize, velocity: &[Vec2]) -> Motion {
+    let (mut x, mut y, mut mean_velocity) = (Vec2::zeros(), Vec2::zeros(), Vec2::zeros());
+    for (j, weight) in geometry.gradient.forward.iter_row(s) {
+        let v_j = velocity[j];
+        x += weight.gradient * v_j.x;
+        y += weight.gradient * v_j.y;
+        mean_velocity += v_j * weight.share;
+    }
+    let (free_x, free_y) = (x, y);
+    for (j, weight) in geometry.wall.forward.iter_row(s) {
+        let v_j = velocity[j];
+        x += weight.x * v_j.x;
+        y += weight.y * v_j.y;
+    }
+    Motion { x, y, free_x, free_y, mean_velocity }
+}
+
+impl Motion {
+    /// Strain and spin over a step (Eq. 4).
+    #[inline]
+    pub fn increment(&self, dt: f64) -> StrainIncrement {
+        StrainIncrement {
+            xx: self.x.x * dt,
+            yy: self.y.y * dt,
+            xy: (self.x.y + self.y.x) * dt,
+            spin: 0.5 * (self.x.y - self.y.x) * dt,
+        }
+    }
+
+    /// What the force loop will read of this stress node: its stress, and the filter's linear part.
+    ///
+    /// The filter takes from every velocity node its residual against the linear fit, `v_j - v_s - grad v (x_j -
+    /// x_s)`. Summed over a stencil the fit's part is `grad v . c` against the gradient weights, so it joins the
+    /// stress; the rest needs only the mean velocity. The sum is symmetric and vanishes on linear fields.
+    #[inline]
+    pub fn share(&self, point: &StressPoint, covariance: [f64; 3], filter: Filter) -> NodalShare {
+        let speed = (point.shear_modulus / point.density).sqrt().max(LEAST_FILTER_SPEED);
+        let coefficient = filter.strength * point.density * speed * filter.volume;
+        let [c_xx, c_xy, c_yy] = covariance;
+        let linear = |g: Vec2| [g.x * c_xx + g.y * c_xy, g.x * c_xy + g.y * c_yy];
+        let (f_x, f_y) = (linear(self.free_x), linear(self.free_y));
+        let Stress { xx, yy, xy, .. } = point.stress;
+        NodalShare {
+            tensor: [
+                filter.volume * xx - coefficient * f_x[0],
+                filter.volume * xy - coefficient * f_x[1],
+                filter.volume * xy - coefficient * f_y[0],
+                filter.volume * yy - coefficient * f_y[1],
+            ],
+            mean_velocity: self.mean_velocity,
+            filter: coefficient,
+        }
+    }
+}
+
+/// Force of the skeleton on velocity node `j`, kN/m: the exact transpose of the gradient.
+#[inline]
+pub fn conservative_force(
+    geometry: &Geometry,
+    j: usize,
+    velocity: Vec2,
+    shares: &[NodalShare],
+    points: &[StressPoint],
+    volume: f64,
+) -> Vec2 {
+    let mut force = Vec2::zeros();
+    for (s, weight) in geometry.gradient.transposed.iter_row(j) {
+        let share = &shares[s];
+        let [xx, xy, yx, yy] = share.tensor;
+        let g = weight.gradient;
+        force.x -= xx * g.x + xy * g.y;
+        force.y -= yx * g.x + yy * g.y;
+        force += (share.mean_velocity - velocity) * (share.filter * weight.share);
+    }
+    for (s, weight) in geometry.wall.transposed.iter_row(j) {
+        let Stress { xx, yy, xy, .. } = points[s].stress;
+        force.x -= volume * (xx * weight.x.x + xy * weight.x.y);
+        force.y -= volume * (xy * weight.y.x + yy * weight.y.y);
+    }
+    force
+}
+
+/// Stresses that the printed force needs beside those of the stress nodes.
+#[derive(Debug, Clone, Default)]
+pub struct PrintedStress {
+    /// Effective stress `(xx, yy, xy)` at velocity nodes, Eq. 10.
+    node: Vec<[f64; 3]>,
+    /// The same at the mirrored stress nodes below the base, Eq. 11.
+    ghost: Vec<[f64; 3]>,
+}
+
+impl PrintedStress {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.node.as_slice()) + size_of_val(self.ghost.as_slice())
+    }
+
+    /// Evaluates Eqs 10 and 11. With `odd_shear` the ghosts' shear mirrors with opposite sign: a base that
+    /// carries no shear but the dashpots'.
+    pub fn update(&mut self, tables: &PrintedTables, points: &[StressPoint], odd_shear: bool) {
+        self.node.clear();
+        self.node.extend((0..tables.interpolation.rows()).map(|i| {
+            tables.interpolation.iter_row(i).fold([0.0; 3], |sum, (s, &w)| {
+                let Stress { xx, yy, xy, .. } = points[s].stress;
+                [sum[0] + w * xx, sum[1] + w * yy, sum[2] + w * xy]
+            })
+        }));
+        self.ghost.clear();
+        let node = &self.node;
+        self.ghost.extend((0..tables.ghost_stress.rows()).map(|b| {
+            let fitted = |table: &sandboil_sph::Csr<f64>, component: usize| -> f64 {
+                table.iter_row(b).map(|(j, w)| w * node[j][component]).sum()
+            };
+            let shear =
+                if odd_shear { -fitted(&tables.mirror_stress, 2) } else { fitted(&tables.ghost_stress, 2) };
+            [fitted(&tables.ghost_stress, 0), fitted(&tables.ghost_stress, 1), shear]
+        }));
+    }
+
+    /// Skeleton force of Eq. 6 on velocity node `i`, kN/m; `density` are the dry densities of velocity nodes.
+    #[inline]
+    pub fn force(
+        &self,
+        tables: &PrintedTables,
+        i: usize,
+        points: &[StressPoint],
+        density: &[f64],
+        volume: f64,
+    ) -> Vec2 {
+        let own = self.node[i];
+        let mut force = Vec2::zeros();
+        let mut add = |stress: [f64; 3], rho_j: f64, gradient: &Vec2| {
+            let (from_i, from_j) = (rho_j / density[i], density[i] / rho_j);
+            let [xx, yy, xy] = [0, 1, 2].map(|c| from_i * own[c] + from_j * stress[c]);
+            force.x += xx * gradient.x + xy * gradient.y;
+            force.y += xy * gradient.x + yy * gradient.y;
+        };
+        for (s, gradient) in tables.kernel_gradient.iter_row(i) {
+            let Stress { xx, yy, xy, .. } = points[s].stress;
+            add([xx, yy, xy], density[s / crate::model::STRESS_NODES], gradient);
+        }
+        for (b, gradient) in tables.ghost_gradient.iter_row(i) {
+            add(self.ghost[b], density[i], gradient);
+        }
+        force * volume
+    }
+}
+
+/// Engineering shear strain of the largest in-plane Mohr circle.
+pub fn maximum_shear_strain([xx, yy, xy]: [f64; 3]) -> f64 {
+    (xx - yy).hypot(xy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        geometry::Wall,
+        model::{AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, STRESS_NODES, Soil},
+    };
+    use proptest::prelude::*;
+    use sandboil_soil::{Integrator, elastic::Elastic};
+    use sandboil_sph::Period;
+
+    const COLUMNS: usize = 5;
+    const ROWS: usize = 6;
+    const NODES: usize = COLUMNS * ROWS;
+
+    /// A block of unit spacing with disordered nodes; free unless a period is given.
+    fn block(disorder: &[(f64, f64)], period: Option<Period>) -> Model {
+        let position: Vec<Vec2> = disorder
+            .iter()
+            .enumerate()
+            .map(|(k, (a, b))| Vec2::new((k % COLUMNS) as f64 + 0.1 * a, (k / COLUMNS) as f64 + 0.1 * b))
+            .collect();
+        Model {
+            spacing: Vec2::repeat(1.0),
+            region: vec![0; NODES],
+            regions: vec![Region {
+                soil: Soil::Elastic(Elastic::new(1.0, 2.0).unwrap()),
+                porosity: 0.5,
+                solid_density: 2.0,
+                hydraulic_conductivity: 0.0,
+                earth_pressure_coefficient: 0.5,
+                static_poisson_ratio: 1.0 / 3.0,
+            }],
+            surface_elevation: vec![ROWS as f64; NODES],
+            vertical_effective_stress: vec![0.0; STRESS_NODES * NODES],
+            pore_pressure: Vec::new(),
+            position,
+            water: None,
+            gravity: 10.0,
+            period,
+            base_elevation: -100.0,
+            numerics: Numerics {
+                operators: Operators::Conservative,
+                smoothing_ratio: 1.4,
+                velocity_filter: 0.1,
+                diffusion: Diffusion::Auto,
+                acceleration_term: AccelerationTerm::Auto,
+                geometry_strain_limit: 0.02,
+                integrator: Integrator::default(),
+            },
+        }
+    }
+
+    fn forces(geometry: &Geometry, points: &[StressPoint], velocity: &[Vec2], filter: Filter) -> Vec<Vec2> {
+        let shares: Vec<NodalShare> = (0..points.len())
+            .map(|s| motion(geometry, s, velocity).share(&points[s], geometry.covariance[s], filter))
+            .collect();
+        let force = |j| conservative_force(geometry, j, velocity[j], &shares, points, filter.volume);
+        (0..velocity.len()).map(force).collect()
+    }
+
+    fn vectors(range: f64, count: usize) -> impl Strategy<Value = Vec<(f64, f64)>> {
+        prop::collection::vec((-range..range, -range..range), count)
+    }
+
+    proptest! {
+        #[test]
+        fn force_is_the_transpose_of_strain_and_conserves_momentum(
+            disorder in vectors(1.0, NODES), v in vectors(1.0, NODES), normal in vectors(9.0, STRESS_NODES * NODES),
+            shear in vectors(9.0, STRESS_NODES * NODES), wall in 0_u8..4,
+        ) {
+            let wall_at_base = wall > 0;
+            let mut model = block(&disorder, None);
+            if wall_at_base {
+                model.base_elevation = -0.5;
+            }
+            let wall = [Wall::NO_SLIP, Wall::NO_SLIP, Wall::TRACTION, Wall::FREE_SLIP][wall as usize];
+            let geometry = Geometry::build(&model, &model.position, wall, None);
+            let velocity: Vec<Vec2> = v.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
+            let filter = Filter { strength: 0.0, volume: 0.5 };
+            let points: Vec<StressPoint> = normal.iter().zip(&shear).map(|(n, s)| StressPoint {
+                stress: Stress { xx: n.0, yy: n.1, xy: s.0, zz: 0.0 },
+                density: 1.0,
+                ..StressPoint::default()
+            }).collect();
+            let force = forces(&geometry, &points, &velocity, filter);
+            let power: f64 = force.iter().zip(&velocity).map(|(f, v)| f.dot(v)).sum();
+            let stored: f64 = points.iter().enumerate().map(|(s, point)| {
+                let rate = motion(&geometry, s, &velocity).increment(1.0);
+                filter.volume * (point.stress.xx * rate.xx + point.stress.yy * rate.yy + point.stress.xy * rate.xy)
+            }).sum();
+            prop_assert!((power + stored).abs() < 1e-12 * (1.0 + stored.abs()) * 100.0, "{} {}", power, stored);
+            if !wall_at_base {
+                let linear: Vec2 = force.iter().sum();
+                let angular: f64 = force.iter().zip(&model.position).map(|(f, x)| x.x * f.y - x.y * f.x).sum();
+                prop_assert!(linear.norm() < 1e-11 && angular.abs() < 1e-10, "{} {}", linear, angular);
+            }
+        }
+
+        #[test]
+        fn filter_takes_energy_from_rough_fields_and_leaves_linear_ones(
+            disorder in vectors(1.0, NODES), v in vectors(1.0, NODES), periodic in any::<bool>(),
+            (a, b, c, d) in (-1.0_f64..1.0, -1.0_f64..1.0, -1.0_f64..1.0, -1.0_f64..1.0),
+        ) {
+            let period = periodic.then_some(Period { width: COLUMNS as f64 });
+            let model = block(&disorder, period);
+            let geometry = Geometry::build(&model, &model.position, Wall::NO_SLIP, None);
+            let filter = Filter { strength: 0.1, volume: 0.5 };
+            let points = vec![StressPoint { shear_modulus: 1e4, density: 1.0, ..StressPoint::default() }; STRESS_NODES * NODES];
+            let rough: Vec<Vec2> = v.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
+            let force = forces(&geometry, &points, &rough, filter);
+            let power: f64 = force.iter().zip(&rough).map(|(f, v)| f.dot(v)).sum();
+            prop_assert!(power < 0.0, "{}", power);
+            // Largest eigenvalue of the filter: 1.05 xi C_s / dx, so no more power than that.
+            let bound = 1.1 * 0.1 * 100.0 * rough.iter().map(|v| v.norm_squared()).sum::<f64>();
+            prop_assert!(-power < 2.0 * bound, "{} {}", power, bound);
+            if !periodic {
+                let linear: Vec<Vec2> =
+                    model.position.iter().map(|x| Vec2::new(a + b * x.x + c * x.y, d - c * x.x + a * x.y)).collect();
+                let force = forces(&geometry, &points, &linear, filter);
+                prop_assert!(force.iter().all(|f| f.norm() < 1e-9), "{:?}", force);
+            }
+        }
+    }
+}

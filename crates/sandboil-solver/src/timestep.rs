@@ -1,0 +1,162 @@
+//! The largest stable time step, by measured limits, and what sets it.
+
+use crate::model::{Model, Operators};
+use sandboil_sph::{
+    Vec2, WendlandQuintic,
+    operators::{Member, corrected_gradient, laplacian_factor},
+};
+
+/// Interior and surface limit of the skeleton wave over `h / c_d` (measured 1.39 dx at h = 1.4 dx).
+const DRAINED_COEFFICIENT: f64 = 1.0;
+/// Limit of the undrained wave over `h / c_u`, surfaces at prescribed pressure.
+const UNDRAINED_COEFFICIENT: f64 = 1.7;
+/// Explicit diffusion: `dt <= 0.65 dx^2 C / k`.
+const DIFFUSION_COEFFICIENT: f64 = 0.65;
+/// Wave numbers sampled along an axis and along a diagonal of the lattice.
+const SPECTRUM_SAMPLES: u32 = 24;
+/// Bisections of the implicit limit: one part in a thousand.
+const BISECTIONS: u32 = 12;
+
+/// What limits the time step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Criterion {
+    /// Compression wave of the drained skeleton.
+    #[default]
+    DrainedWave,
+    /// Compression wave with the pore water's stiffness.
+    UndrainedWave,
+    /// Compression wave whose pore water drains in part within a step (implicit diffusion).
+    DrainingWave,
+    /// Explicit diffusion of pore pressure.
+    Diffusion,
+}
+
+impl Criterion {
+    /// In the user's words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::DrainedWave => "drained compression wave",
+            Self::UndrainedWave => "undrained compression wave",
+            Self::DrainingWave => "partly drained compression wave",
+            Self::Diffusion => "explicit pore-pressure diffusion",
+        }
+    }
+}
+
+/// How pore pressure takes part in the limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PressureCoupling {
+    /// No water, or frozen pressure.
+    None,
+    /// Explicit or no diffusion.
+    Explicit,
+    /// Implicit diffusion.
+    Implicit,
+}
+
+/// How the pressure operators of Eq. 7 see waves on the undeformed lattice.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressureSpectrum {
+    /// Pairs of eigenvalues, 1/m2: of the divergence followed by its transpose, and of the Laplacian.
+    eigenvalues: Vec<(f64, f64)>,
+}
+
+impl PressureSpectrum {
+    /// Samples the spectrum of the model's lattice.
+    pub fn new(model: &Model) -> Self {
+        let kernel = WendlandQuintic::new(model.smoothing_length());
+        let volume = model.spacing.x * model.spacing.y;
+        let reach = |spacing: f64| (kernel.support() / spacing).ceil();
+        let (columns, rows) = (reach(model.spacing.x), reach(model.spacing.y));
+        let span = |count: f64| (0..).map(move |k| f64::from(k) - count).take_while(move |k| *k <= count);
+        let members: Vec<Member> = span(columns)
+            .flat_map(|column| span(rows).map(move |row| (column, row)))
+            .map(|(column, row)| Vec2::new(column * model.spacing.x, row * model.spacing.y))
+            .filter(|offset| offset.norm() < kernel.support())
+            .map(|offset| Member { owner: 0, mirrored: false, offset, volume })
+            .collect();
+        let corrected = corrected_gradient(&members, kernel).unwrap_or_default();
+        let factor = laplacian_factor(&members, &corrected);
+        let diagonal = Vec2::new(1.0 / model.spacing.x, 1.0 / model.spacing.y);
+        let directions = [Vec2::new(0.0, diagonal.y), Vec2::new(diagonal.x, 0.0), diagonal]
+            .map(|d| d * std::f64::consts::PI);
+        let eigenvalues = directions
+            .iter()
+            .flat_map(|d| {
+                (1..=SPECTRUM_SAMPLES).map(move |k| d * (f64::from(k) / f64::from(SPECTRUM_SAMPLES)))
+            })
+            .map(|wave| {
+                let gradient: Vec2 =
+                    members.iter().zip(&corrected).map(|(m, g)| g * wave.dot(&m.offset).sin()).sum();
+                let laplacian: f64 = members
+                    .iter()
+                    .zip(&factor)
+                    .map(|(m, f)| 2.0 * f * (1.0 - wave.dot(&m.offset).cos()))
+                    .sum();
+                (gradient.norm_squared(), laplacian)
+            })
+            .collect();
+        Self { eigenvalues }
+    }
+
+    /// Largest share of the stability bound that implicitly diffused pressure takes at a step `dt`: a mode that
+    /// flips sign each step is bounded by `s/4 + q / (2 (2 + kappa lambda dt)) < 1`, with `s` and `q` the
+    /// skeleton's and the water's squared frequencies times `dt^2`.
+    fn share(&self, stiffness_over_density: f64, diffusivity: f64, dt: f64) -> f64 {
+        self.eigenvalues
+            .iter()
+            .map(|(gradient, laplacian)| {
+                stiffness_over_density * gradient * dt * dt / (2.0 * (2.0 + diffusivity * laplacian * dt))
+            })
+            .fold(0.0, f64::max)
+    }
+}
+
+/// Limit for one region at a skeleton stiffness `K + 4G/3` in kPa, s.
+///
+/// `spectrum` belongs to implicit diffusion and is read only there.
+pub fn region_limit(
+    model: &Model,
+    region: usize,
+    skeleton_stiffness: f64,
+    coupling: PressureCoupling,
+    spectrum: &PressureSpectrum,
+) -> (f64, Criterion) {
+    let h = model.smoothing_length();
+    let density = model.mixture_density(region);
+    // The filter's damping narrows the stable range; the printed set carries none.
+    let filter = match model.numerics.operators {
+        Operators::Conservative => 1.0 + model.numerics.velocity_filter,
+        Operators::Printed => 1.0,
+    };
+    let wave = |coefficient: f64, stiffness: f64| coefficient * h / (stiffness / density).sqrt() / filter;
+    let drained = (wave(DRAINED_COEFFICIENT, skeleton_stiffness), Criterion::DrainedWave);
+    if coupling == PressureCoupling::None {
+        return drained;
+    }
+    let water = model.water_stiffness(region);
+    let undrained = (wave(UNDRAINED_COEFFICIENT, skeleton_stiffness + water), Criterion::UndrainedWave);
+    let combined = if undrained.0 < drained.0 { undrained } else { drained };
+    let diffusivity = model.pressure_diffusivity(region);
+    if diffusivity == 0.0 {
+        return combined;
+    }
+    if coupling == PressureCoupling::Explicit {
+        let area = model.spacing.x.min(model.spacing.y).powi(2);
+        let diffusion = DIFFUSION_COEFFICIENT * area / diffusivity;
+        let both = (combined.0.powi(-2) + diffusion.powi(-2)).powf(-0.5);
+        return (both, if diffusion < combined.0 { Criterion::Diffusion } else { combined.1 });
+    }
+    // Water that drains at grid scale within a step stiffens the short waves no more.
+    let stable =
+        |dt: f64| (dt / drained.0).powi(2) + spectrum.share(water / density, diffusivity, dt * filter) <= 1.0;
+    let (mut low, mut high) = (combined.0.min(drained.0), drained.0);
+    if !stable(low) {
+        return combined;
+    }
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        if stable(middle) { low = middle } else { high = middle }
+    }
+    (low, if low > 0.99 * drained.0 { Criterion::DrainedWave } else { Criterion::DrainingWave })
+}

@@ -1,0 +1,72 @@
+//! Columns that several test files build.
+
+use sandboil_soil::{Integrator, elastic::Elastic};
+use sandboil_solver::{
+    AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, Soil, Water, stress_node_offset,
+};
+use sandboil_sph::{Period, Vec2};
+
+/// Numerical choices of the default set.
+pub fn numerics() -> Numerics {
+    Numerics {
+        operators: Operators::Conservative,
+        smoothing_ratio: 1.4,
+        velocity_filter: 0.1,
+        diffusion: Diffusion::Auto,
+        acceleration_term: AccelerationTerm::Auto,
+        geometry_strain_limit: 0.02,
+        integrator: Integrator::default(),
+    }
+}
+
+/// A uniform column on periodic sides, `columns` nodes wide, surface at `height`, base at zero.
+pub fn column(height: f64, spacing: f64, columns: usize, region: Region, water: Option<Water>) -> Model {
+    let rows = (height / spacing).round() as usize;
+    let position: Vec<Vec2> = (0..rows * columns)
+        .map(|k| Vec2::new((k % columns) as f64 + 0.5, (k / columns) as f64 + 0.5) * spacing)
+        .collect();
+    let gravity = 9.81;
+    let unit_weight = water.map_or(0.0, |w| w.unit_weight);
+    let bulk = (1.0 - region.porosity) * region.solid_density * gravity + region.porosity * unit_weight;
+    let offset = stress_node_offset(Vec2::repeat(spacing));
+    let effective = |x: Vec2| (bulk - unit_weight) * (height - x.y);
+    Model {
+        spacing: Vec2::repeat(spacing),
+        region: vec![0; position.len()],
+        surface_elevation: vec![height; position.len()],
+        vertical_effective_stress: position
+            .iter()
+            .flat_map(|&x| [effective(x + offset), effective(x - offset)])
+            .collect(),
+        pore_pressure: match water {
+            Some(water) => position.iter().map(|x| water.unit_weight * (height - x.y)).collect(),
+            None => Vec::new(),
+        },
+        position,
+        regions: vec![region],
+        water,
+        gravity,
+        period: Some(Period { width: columns as f64 * spacing }),
+        base_elevation: 0.0,
+        numerics: numerics(),
+    }
+}
+
+/// The same column without weight: initial stress turns with the soil and would change its wave speed.
+pub fn weightless(mut model: Model) -> Model {
+    model.gravity *= 1e-9;
+    model.vertical_effective_stress.fill(0.0);
+    model
+}
+
+/// Linear elastic soil of mixture density 2 Mg/m3 when dry.
+pub fn elastic(shear_modulus: f64, bulk_modulus: f64) -> Region {
+    Region {
+        soil: Soil::Elastic(Elastic::new(shear_modulus, bulk_modulus).unwrap()),
+        porosity: 0.4,
+        solid_density: 2.0 / 0.6,
+        hydraulic_conductivity: 0.0,
+        earth_pressure_coefficient: 0.5,
+        static_poisson_ratio: 1.0 / 3.0,
+    }
+}
