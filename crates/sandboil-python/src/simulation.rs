@@ -118,7 +118,7 @@ impl Simulation {
     #[new]
     fn new(description: &Bound<'_, PyDict>, threads: usize) -> PyResult<Self> {
         let model = model(description)?;
-        let inner = description.py().detach(|| solver::Simulation::new(model, threads)).map_err(CoreError)?;
+        let inner = description.py().detach(|| solver::Simulation::new(&model, threads)).map_err(CoreError)?;
         Ok(Self { inner })
     }
 
@@ -231,6 +231,7 @@ impl Simulation {
             ("base_calls", counters.base_calls),
             ("plastic_updates", counters.plastic_updates),
             ("geometry_builds", counters.geometry_builds),
+            ("porosity_clips", counters.porosity_clips),
             ("time_step_changes", counters.time_step_changes),
             ("substeps", counters.soil.substeps),
             ("evaluations", counters.soil.evaluations),

@@ -3,7 +3,7 @@
 //! The unknown is the excess over the pressure at the start of the stage, in kPa: its reference is carried by
 //! the constant nodal forces, and only the increments meet the transposed operators.
 
-use crate::{banded::BandedLu, geometry::FlowTables, model::Model};
+use crate::{banded::BandedLu, geometry::FlowTables, model::Model, phases::Phases};
 use sandboil_sph::{Csr, Vec2};
 
 /// A node whose pressure follows from the prescribed value on the free surface (half-cell rule).
@@ -56,13 +56,13 @@ pub enum FlowScheme {
 
 impl Flow {
     /// Zero excess pressure everywhere.
-    pub fn new(model: &Model, scheme: FlowScheme) -> Option<Self> {
+    pub fn new(model: &Model, phases: &Phases, scheme: FlowScheme) -> Option<Self> {
         let water = model.water?;
         let per_node =
             |value: &dyn Fn(usize) -> f64| model.region.iter().map(|&r| value(r as usize)).collect();
         Some(Self {
             excess: vec![0.0; model.nodes()],
-            stiffness: per_node(&|region| model.water_stiffness(region)),
+            stiffness: (0..model.nodes()).map(|node| model.water_stiffness(phases.porosity(node))).collect(),
             conductivity: per_node(&|region| model.regions[region].hydraulic_conductivity),
             unit_weight: water.unit_weight,
             gravity: model.gravity,
@@ -77,8 +77,11 @@ impl Flow {
         })
     }
 
-    /// Forgets factors made for another geometry.
-    pub fn geometry_changed(&mut self) {
+    /// Takes over the porosities and forgets factors made for another geometry.
+    pub fn geometry_changed(&mut self, model: &Model, phases: &Phases) {
+        for (node, stiffness) in self.stiffness.iter_mut().enumerate() {
+            *stiffness = model.water_stiffness(phases.porosity(node));
+        }
         if let Scheme::Implicit { factors } = &mut self.scheme {
             *factors = None;
         }
@@ -165,15 +168,14 @@ impl Flow {
 fn implicit_matrix(diffusion: &Csr<f64>, surface: &[SurfaceNode], stiffness: &[f64], scale: f64) -> Csr<f64> {
     let mut matrix = Csr::with_capacity(diffusion.rows(), diffusion.entries());
     let mut ties = surface.iter().peekable();
-    for row in 0..diffusion.rows() {
+    for (row, stiffness) in stiffness.iter().enumerate() {
         let own = u32::try_from(row).unwrap_or(u32::MAX);
         let mut entries = vec![(own, 1.0)];
-        match ties.next_if(|tie| tie.node == own) {
-            Some(tie) => entries.push((tie.inner, -tie.fraction)),
-            None => {
-                let (columns, weights) = diffusion.row(row);
-                entries.extend(columns.iter().zip(weights).map(|(&c, w)| (c, -scale * stiffness[row] * w)));
-            }
+        if let Some(tie) = ties.next_if(|tie| tie.node == own) {
+            entries.push((tie.inner, -tie.fraction));
+        } else {
+            let (columns, weights) = diffusion.row(row);
+            entries.extend(columns.iter().zip(weights).map(|(&c, w)| (c, -scale * stiffness * w)));
         }
         matrix.push_row(&mut entries);
     }

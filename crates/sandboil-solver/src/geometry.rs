@@ -178,11 +178,16 @@ fn real_only(members: &[Member]) -> Vec<Member> {
 }
 
 impl Geometry {
-    /// Builds all tables at `position`. Lists of `previous` are kept while no node has left their skin.
-    pub fn build(model: &Model, position: &[Vec2], wall: Wall, previous: Option<Self>) -> Self {
+    /// Builds all tables at `position` for nodes of `volume` (m2). Lists of `previous` are kept while no node has left their skin.
+    pub fn build(
+        model: &Model,
+        position: &[Vec2],
+        volume: &[f64],
+        wall: Wall,
+        previous: Option<Self>,
+    ) -> Self {
         let kernel = WendlandQuintic::new(model.smoothing_length());
         let skin = SKIN * model.mean_spacing();
-        let volume = vec![model.spacing.x * model.spacing.y; position.len()];
         // The lists may be older than the images' cut-off, so images reach one skin further than the kernel.
         let sources = sources(position, model.base_elevation, kernel.support() + 2.0 * skin);
         let stress_position = stress_node_positions(position, model.spacing);
@@ -205,7 +210,7 @@ impl Geometry {
                 ),
                 from_velocity: NeighbourList::build(position, &sources, kernel.support(), skin, model.period),
             });
-        let stencils = Stencils { sources: &sources, volume: &volume, kernel, period: model.period };
+        let stencils = Stencils { sources: &sources, volume, kernel, period: model.period };
         let (gradient, covariance, wall_table) = match model.numerics.operators {
             Operators::Conservative => {
                 least_squares_tables(&stencils, &list.from_stress, &stress_position, wall)
@@ -441,12 +446,11 @@ fn printed_tables(
 }
 
 /// Gradient of Eq. 9 of a nodal field at the velocity nodes, unit of the field per m.
-pub fn consistent_gradient(model: &Model, position: &[Vec2], field: &[f64]) -> Vec<Vec2> {
+pub fn consistent_gradient(model: &Model, position: &[Vec2], volume: &[f64], field: &[f64]) -> Vec<Vec2> {
     let kernel = WendlandQuintic::new(model.smoothing_length());
-    let volume = vec![model.spacing.x * model.spacing.y; position.len()];
     let sources = sources(position, f64::NEG_INFINITY, 0.0);
     let list = NeighbourList::build(position, &sources, kernel.support(), 0.0, model.period);
-    let stencils = Stencils { sources: &sources, volume: &volume, kernel, period: model.period };
+    let stencils = Stencils { sources: &sources, volume, kernel, period: model.period };
     position
         .iter()
         .enumerate()

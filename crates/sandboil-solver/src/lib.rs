@@ -11,6 +11,7 @@ mod flow;
 mod geometry;
 pub mod model;
 mod parallel;
+mod phases;
 mod record;
 pub mod simulation;
 mod skeleton;

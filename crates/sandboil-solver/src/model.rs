@@ -164,14 +164,15 @@ impl Model {
     }
 
     /// Stiffness `K_f / n` of the pore water in undrained compression, kPa; zero without water.
-    pub fn water_stiffness(&self, region: usize) -> f64 {
-        self.water.map_or(0.0, |water| water.bulk_modulus / self.regions[region].porosity)
+    pub fn water_stiffness(&self, porosity: f64) -> f64 {
+        self.water.map_or(0.0, |water| water.bulk_modulus / porosity)
     }
 
     /// Pressure diffusivity `kappa = k / C` of a region, m2/s, with the storage `C = n gamma_f / K_f` of Eq. 3.
     pub fn pressure_diffusivity(&self, region: usize) -> f64 {
         self.water.map_or(0.0, |water| {
-            self.regions[region].hydraulic_conductivity * self.water_stiffness(region) / water.unit_weight
+            let Region { hydraulic_conductivity, porosity, .. } = self.regions[region];
+            hydraulic_conductivity * self.water_stiffness(porosity) / water.unit_weight
         })
     }
 
@@ -214,12 +215,11 @@ impl Model {
             positive("period", period.width)?;
         }
         for region in &self.regions {
-            if !(region.porosity > 0.0 && region.porosity < 1.0) {
-                return Err(SolverError::InvalidInput {
-                    name: "porosity",
-                    value: region.porosity,
-                    expected: "in (0, 1)",
-                });
+            // Dry soil given by its weight alone counts as solid throughout; water needs pores.
+            let least = if self.water.is_some() { f64::MIN_POSITIVE } else { 0.0 };
+            if !(region.porosity >= least && region.porosity < 1.0) {
+                let expected = "in (0, 1), zero only in a dry section";
+                return Err(SolverError::InvalidInput { name: "porosity", value: region.porosity, expected });
             }
             positive("solid_density", region.solid_density)?;
             positive("earth_pressure_coefficient", region.earth_pressure_coefficient)?;

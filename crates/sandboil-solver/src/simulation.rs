@@ -7,10 +7,9 @@ use crate::{
     geometry::{Geometry, Wall, consistent_gradient, point_weights, stress_node_positions},
     model::{AccelerationTerm, Diffusion, Model, Operators, STRESS_NODES, Soil},
     parallel::{Rows, chunks, for_each_chunk},
+    phases::Phases,
     record::{Probes, Recorder},
-    skeleton::{
-        Filter, NodalShare, PrintedStress, StressPoint, conservative_force, maximum_shear_strain, motion,
-    },
+    skeleton::{NodalShare, PrintedStress, StressPoint, conservative_force, maximum_shear_strain, motion},
     soil_field::SoilField,
     timestep::{Criterion, PressureCoupling, PressureSpectrum, region_limit},
 };
@@ -83,6 +82,8 @@ pub struct Counters {
     pub plastic_updates: u64,
     /// Geometries built.
     pub geometry_builds: u64,
+    /// Porosities kept in the range of a grain packing.
+    pub porosity_clips: u64,
     /// Changes of the time step.
     pub time_step_changes: u64,
     /// What the soil models counted.
@@ -131,8 +132,8 @@ pub struct Simulation {
     position: Vec<Vec2>,
     velocity: Vec<Vec2>,
     acceleration: Vec<Vec2>,
+    phases: Phases,
     mass: Vec<f64>,
-    dry_density: Vec<f64>,
     points: Vec<StressPoint>,
     shares: Vec<NodalShare>,
     soil: SoilField,
@@ -155,32 +156,27 @@ impl Simulation {
     ///
     /// # Errors
     /// Bad input, or a thread pool that cannot be made.
-    pub fn new(model: Model, threads: usize) -> Result<Self, SolverError> {
+    pub fn new(model: &Model, threads: usize) -> Result<Self, SolverError> {
         model.validate()?;
-        let (model, order) = sorted(&model);
+        let (model, order) = sorted(model);
         let nodes = model.nodes();
         let pool = (threads > 1)
             .then(|| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
             .transpose()
             .map_err(|error| SolverError::Threads { threads, reason: error.to_string() })?;
-        let geometry = Geometry::build(&model, &model.position, Wall::NO_SLIP, None);
-        let volume = model.spacing.x * model.spacing.y;
-        let density = |&region: &u32| model.mixture_density(region as usize);
+        let phases = Phases::new(&model);
+        let geometry = Geometry::build(&model, &model.position, phases.volume(), Wall::NO_SLIP, None);
         let mut points: Vec<StressPoint> = (0..STRESS_NODES * nodes)
             .map(|s| {
                 let region = &model.regions[model.region[s / STRESS_NODES] as usize];
                 let vertical = -model.vertical_effective_stress[s];
                 let lateral = region.earth_pressure_coefficient * vertical;
                 let stress = Stress { xx: lateral, yy: vertical, xy: 0.0, zz: lateral };
-                StressPoint {
-                    stress,
-                    density: density(&model.region[s / STRESS_NODES]),
-                    ..StressPoint::default()
-                }
+                StressPoint { stress, ..StressPoint::default() }
             })
             .collect();
         let soil = SoilField::elastic(&model, &mut points)?;
-        Ok(Self {
+        let mut simulation = Self {
             order,
             threads,
             pool,
@@ -189,14 +185,7 @@ impl Simulation {
             position: model.position.clone(),
             velocity: vec![Vec2::zeros(); nodes],
             acceleration: vec![Vec2::zeros(); nodes],
-            mass: model.region.iter().map(|region| density(region) * volume).collect(),
-            dry_density: model
-                .region
-                .iter()
-                .map(|&r| {
-                    (1.0 - model.regions[r as usize].porosity) * model.regions[r as usize].solid_density
-                })
-                .collect(),
+            mass: vec![0.0; nodes],
             shares: vec![NodalShare::default(); points.len()],
             points,
             soil,
@@ -213,8 +202,11 @@ impl Simulation {
             counters: Counters { geometry_builds: 1, ..Counters::default() },
             sums: vec![MotionSum::default(); chunks(nodes)],
             unit: vec![(); nodes],
+            phases,
             model,
-        })
+        };
+        simulation.follow_volumes();
+        Ok(simulation)
     }
 
     /// Begins the static stage: soil elastic, pore pressure frozen, base fixed.
@@ -228,10 +220,10 @@ impl Simulation {
         let gravity = Vec2::new(0.0, -self.model.gravity);
         self.constant_force = self.mass.iter().map(|mass| gravity * *mass).collect();
         if self.model.water.is_some() {
-            let volume = self.model.spacing.x * self.model.spacing.y;
-            let gradient = consistent_gradient(&self.model, &self.position, &self.model.pore_pressure);
-            for (force, gradient) in self.constant_force.iter_mut().zip(gradient) {
-                *force -= gradient * volume;
+            let (volume, pressure) = (self.phases.volume(), &self.model.pore_pressure);
+            let gradient = consistent_gradient(&self.model, &self.position, volume, pressure);
+            for ((force, gradient), volume) in self.constant_force.iter_mut().zip(gradient).zip(volume) {
+                *force -= gradient * *volume;
             }
         }
         (self.dt, self.criterion) = self.limit(PressureCoupling::None, RELAXATION_FACTOR);
@@ -261,6 +253,7 @@ impl Simulation {
         });
         self.velocity.fill(Vec2::zeros());
         self.acceleration.fill(Vec2::zeros());
+        self.phases.restart_strain();
         for point in &mut self.points {
             point.strain = [0.0; 3];
         }
@@ -268,7 +261,7 @@ impl Simulation {
         let impedance = self.base_impedance(stage.half_space);
         let base = CompliantBase::new(&self.model, &self.position, &self.mass, impedance, stage.wave.clone());
         let scheme = self.flow_scheme(stage.time_step_factor);
-        self.flow = Flow::new(&self.model, scheme);
+        self.flow = Flow::new(&self.model, &self.phases, scheme);
         let coupling = match (&self.flow, scheme) {
             (None, _) => PressureCoupling::None,
             (_, FlowScheme::Implicit) => PressureCoupling::Implicit,
@@ -349,11 +342,26 @@ impl Simulation {
     fn rebuild_geometry(&mut self) {
         // The tables are replaced as a whole; the lists of the old ones serve while no node left their skin.
         let previous = self.geometry.clone();
-        self.geometry = Geometry::build(&self.model, &self.position, self.wall, Some(previous));
+        self.follow_volumes();
+        let volume = self.phases.volume();
+        self.geometry = Geometry::build(&self.model, &self.position, volume, self.wall, Some(previous));
         if let Some(flow) = &mut self.flow {
-            flow.geometry_changed();
+            flow.geometry_changed(&self.model, &self.phases);
         }
         self.counters.geometry_builds += 1;
+    }
+
+    /// Volumes, densities and masses of the present strain.
+    fn follow_volumes(&mut self) {
+        self.counters.porosity_clips += self.phases.follow(&self.points);
+        for (node, mass) in self.mass.iter_mut().enumerate() {
+            *mass = self.phases.mass(node);
+            let volume = self.phases.volume()[node];
+            for point in &mut self.points[STRESS_NODES * node..STRESS_NODES * (node + 1)] {
+                point.density = *mass / volume;
+                point.volume = volume / STRESS_NODES as f64;
+            }
+        }
     }
 
     /// Fills the force loop's shares from the present stress and velocity.
@@ -365,11 +373,9 @@ impl Simulation {
         }
     }
 
-    fn filter(&self) -> Filter {
-        Filter {
-            strength: self.model.numerics.velocity_filter / self.model.mean_spacing(),
-            volume: self.model.spacing.x * self.model.spacing.y / STRESS_NODES as f64,
-        }
+    /// Strength `xi / dx` of the velocity filter, 1/m.
+    fn filter(&self) -> f64 {
+        self.model.numerics.velocity_filter / self.model.mean_spacing()
     }
 
     fn flow_scheme(&self, factor: f64) -> FlowScheme {
@@ -460,17 +466,9 @@ impl Simulation {
     /// Force on node `j`, moving at `velocity`, from stress and excess pore pressure (Eq. 6), kN/m.
     #[inline]
     fn internal_force(&self, j: usize, velocity: Vec2) -> Vec2 {
-        let volume = self.model.spacing.x * self.model.spacing.y;
         let mut force = match (&self.printed_stress, &self.geometry.printed) {
-            (Some(stress), Some(tables)) => stress.force(tables, j, &self.points, &self.dry_density, volume),
-            _ => conservative_force(
-                &self.geometry,
-                j,
-                velocity,
-                &self.shares,
-                &self.points,
-                volume / STRESS_NODES as f64,
-            ),
+            (Some(stress), Some(tables)) => stress.force(tables, j, &self.points, &self.phases),
+            _ => conservative_force(&self.geometry, j, velocity, &self.shares, &self.points),
         };
         if let (Some(flow), Some(tables)) = (&self.flow, &self.geometry.flow) {
             match &self.geometry.printed {
@@ -481,7 +479,7 @@ impl Simulation {
                 }
                 Some(printed) => {
                     for (i, gradient) in printed.pressure_gradient.iter_row(j) {
-                        force -= gradient * (flow.excess[i] * volume);
+                        force -= gradient * (flow.excess[i] * self.phases.volume()[j]);
                     }
                 }
             }
@@ -834,6 +832,7 @@ impl Simulation {
             ("motion", 5 * nodes * size_of::<Vec2>()),
             ("stress", size_of_val(self.points.as_slice()) + size_of_val(self.shares.as_slice())),
             ("geometry", self.geometry.bytes()),
+            ("phases", self.phases.bytes()),
         ];
         if let Some(flow) = &self.flow {
             arrays.push(("pore_pressure", flow.bytes()));

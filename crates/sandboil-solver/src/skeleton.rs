@@ -1,6 +1,9 @@
 //! Strain at the stress nodes and force at the velocity nodes: the mechanics of the soil skeleton.
 
-use crate::geometry::{Geometry, PrintedTables};
+use crate::{
+    geometry::{Geometry, PrintedTables},
+    phases::Phases,
+};
 use sandboil_soil::{StrainIncrement, Stress};
 use sandboil_sph::Vec2;
 
@@ -17,6 +20,8 @@ pub struct StressPoint {
     pub stiffness: f64,
     /// Mixture density, Mg/m3.
     pub density: f64,
+    /// Volume per unit thickness: an equal share of its velocity node's, m2.
+    pub volume: f64,
 }
 
 /// What the force loop gathers from a stress node.
@@ -28,15 +33,6 @@ pub struct NodalShare {
     mean_velocity: Vec2,
     /// Filter coefficient `xi rho_m C_s / dx V_s`, kN s/m2.
     filter: f64,
-}
-
-/// Strength of the velocity filter, resolved for one geometry.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Filter {
-    /// `xi / dx`, 1/m.
-    pub strength: f64,
-    /// Volume of a stress node, m2.
-    pub volume: f64,
 }
 
 /// Least shear-wave speed of the filter, m/s: liquefied soil still needs its short waves damped.
@@ -88,20 +84,21 @@ impl Motion {
     /// The filter takes from every velocity node its residual against the linear fit, `v_j - v_s - grad v (x_j -
     /// x_s)`. Summed over a stencil the fit's part is `grad v . c` against the gradient weights, so it joins the
     /// stress; the rest needs only the mean velocity. The sum is symmetric and vanishes on linear fields.
+    /// `filter` is its strength `xi / dx`, 1/m.
     #[inline]
-    pub fn share(&self, point: &StressPoint, covariance: [f64; 3], filter: Filter) -> NodalShare {
+    pub fn share(&self, point: &StressPoint, covariance: [f64; 3], filter: f64) -> NodalShare {
         let speed = (point.shear_modulus / point.density).sqrt().max(LEAST_FILTER_SPEED);
-        let coefficient = filter.strength * point.density * speed * filter.volume;
+        let coefficient = filter * point.density * speed * point.volume;
         let [c_xx, c_xy, c_yy] = covariance;
         let linear = |g: Vec2| [g.x * c_xx + g.y * c_xy, g.x * c_xy + g.y * c_yy];
         let (f_x, f_y) = (linear(self.free_x), linear(self.free_y));
         let Stress { xx, yy, xy, .. } = point.stress;
         NodalShare {
             tensor: [
-                filter.volume * xx - coefficient * f_x[0],
-                filter.volume * xy - coefficient * f_x[1],
-                filter.volume * xy - coefficient * f_y[0],
-                filter.volume * yy - coefficient * f_y[1],
+                point.volume * xx - coefficient * f_x[0],
+                point.volume * xy - coefficient * f_x[1],
+                point.volume * xy - coefficient * f_y[0],
+                point.volume * yy - coefficient * f_y[1],
             ],
             mean_velocity: self.mean_velocity,
             filter: coefficient,
@@ -117,7 +114,6 @@ pub fn conservative_force(
     velocity: Vec2,
     shares: &[NodalShare],
     points: &[StressPoint],
-    volume: f64,
 ) -> Vec2 {
     let mut force = Vec2::zeros();
     for (s, weight) in geometry.gradient.transposed.iter_row(j) {
@@ -129,7 +125,7 @@ pub fn conservative_force(
         force += (share.mean_velocity - velocity) * (share.filter * weight.share);
     }
     for (s, weight) in geometry.wall.transposed.iter_row(j) {
-        let Stress { xx, yy, xy, .. } = points[s].stress;
+        let StressPoint { stress: Stress { xx, yy, xy, .. }, volume, .. } = points[s];
         force.x -= volume * (xx * weight.x.x + xy * weight.x.y);
         force.y -= volume * (xy * weight.y.x + yy * weight.y.y);
     }
@@ -173,32 +169,25 @@ impl PrintedStress {
         }));
     }
 
-    /// Skeleton force of Eq. 6 on velocity node `i`, kN/m; `density` are the dry densities of velocity nodes.
+    /// Skeleton force of Eq. 6 on velocity node `i`, kN/m; with the dry densities of the velocity nodes.
     #[inline]
-    pub fn force(
-        &self,
-        tables: &PrintedTables,
-        i: usize,
-        points: &[StressPoint],
-        density: &[f64],
-        volume: f64,
-    ) -> Vec2 {
-        let own = self.node[i];
+    pub fn force(&self, tables: &PrintedTables, i: usize, points: &[StressPoint], phases: &Phases) -> Vec2 {
+        let (own, rho_i) = (self.node[i], phases.dry_density(i));
         let mut force = Vec2::zeros();
         let mut add = |stress: [f64; 3], rho_j: f64, gradient: &Vec2| {
-            let (from_i, from_j) = (rho_j / density[i], density[i] / rho_j);
+            let (from_i, from_j) = (rho_j / rho_i, rho_i / rho_j);
             let [xx, yy, xy] = [0, 1, 2].map(|c| from_i * own[c] + from_j * stress[c]);
             force.x += xx * gradient.x + xy * gradient.y;
             force.y += xy * gradient.x + yy * gradient.y;
         };
         for (s, gradient) in tables.kernel_gradient.iter_row(i) {
             let Stress { xx, yy, xy, .. } = points[s].stress;
-            add([xx, yy, xy], density[s / crate::model::STRESS_NODES], gradient);
+            add([xx, yy, xy], phases.dry_density(s / crate::model::STRESS_NODES), gradient);
         }
         for (b, gradient) in tables.ghost_gradient.iter_row(i) {
-            add(self.ghost[b], density[i], gradient);
+            add(self.ghost[b], rho_i, gradient);
         }
-        force * volume
+        force * phases.volume()[i]
     }
 }
 
@@ -260,11 +249,11 @@ mod tests {
         }
     }
 
-    fn forces(geometry: &Geometry, points: &[StressPoint], velocity: &[Vec2], filter: Filter) -> Vec<Vec2> {
+    fn forces(geometry: &Geometry, points: &[StressPoint], velocity: &[Vec2], filter: f64) -> Vec<Vec2> {
         let shares: Vec<NodalShare> = (0..points.len())
             .map(|s| motion(geometry, s, velocity).share(&points[s], geometry.covariance[s], filter))
             .collect();
-        let force = |j| conservative_force(geometry, j, velocity[j], &shares, points, filter.volume);
+        let force = |j| conservative_force(geometry, j, velocity[j], &shares, points);
         (0..velocity.len()).map(force).collect()
     }
 
@@ -284,19 +273,19 @@ mod tests {
                 model.base_elevation = -0.5;
             }
             let wall = [Wall::NO_SLIP, Wall::NO_SLIP, Wall::TRACTION, Wall::FREE_SLIP][wall as usize];
-            let geometry = Geometry::build(&model, &model.position, wall, None);
+            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], wall, None);
             let velocity: Vec<Vec2> = v.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
-            let filter = Filter { strength: 0.0, volume: 0.5 };
             let points: Vec<StressPoint> = normal.iter().zip(&shear).map(|(n, s)| StressPoint {
                 stress: Stress { xx: n.0, yy: n.1, xy: s.0, zz: 0.0 },
                 density: 1.0,
+                volume: 0.5,
                 ..StressPoint::default()
             }).collect();
-            let force = forces(&geometry, &points, &velocity, filter);
+            let force = forces(&geometry, &points, &velocity, 0.0);
             let power: f64 = force.iter().zip(&velocity).map(|(f, v)| f.dot(v)).sum();
             let stored: f64 = points.iter().enumerate().map(|(s, point)| {
                 let rate = motion(&geometry, s, &velocity).increment(1.0);
-                filter.volume * (point.stress.xx * rate.xx + point.stress.yy * rate.yy + point.stress.xy * rate.xy)
+                point.volume * (point.stress.xx * rate.xx + point.stress.yy * rate.yy + point.stress.xy * rate.xy)
             }).sum();
             prop_assert!((power + stored).abs() < 1e-12 * (1.0 + stored.abs()) * 100.0, "{} {}", power, stored);
             if !wall_at_base {
@@ -313,11 +302,10 @@ mod tests {
         ) {
             let period = periodic.then_some(Period { width: COLUMNS as f64 });
             let model = block(&disorder, period);
-            let geometry = Geometry::build(&model, &model.position, Wall::NO_SLIP, None);
-            let filter = Filter { strength: 0.1, volume: 0.5 };
-            let points = vec![StressPoint { shear_modulus: 1e4, density: 1.0, ..StressPoint::default() }; STRESS_NODES * NODES];
+            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], Wall::NO_SLIP, None);
+            let points = vec![StressPoint { shear_modulus: 1e4, density: 1.0, volume: 0.5, ..StressPoint::default() }; STRESS_NODES * NODES];
             let rough: Vec<Vec2> = v.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
-            let force = forces(&geometry, &points, &rough, filter);
+            let force = forces(&geometry, &points, &rough, 0.1);
             let power: f64 = force.iter().zip(&rough).map(|(f, v)| f.dot(v)).sum();
             prop_assert!(power < 0.0, "{}", power);
             // Largest eigenvalue of the filter: 1.05 xi C_s / dx, so no more power than that.
@@ -326,7 +314,7 @@ mod tests {
             if !periodic {
                 let linear: Vec<Vec2> =
                     model.position.iter().map(|x| Vec2::new(a + b * x.x + c * x.y, d - c * x.x + a * x.y)).collect();
-                let force = forces(&geometry, &points, &linear, filter);
+                let force = forces(&geometry, &points, &linear, 0.1);
                 prop_assert!(force.iter().all(|f| f.norm() < 1e-9), "{:?}", force);
             }
         }

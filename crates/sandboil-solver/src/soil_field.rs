@@ -5,7 +5,7 @@ use crate::{
     geometry::Geometry,
     model::{Model, STRESS_NODES, Soil},
     parallel::{Rows, chunks, for_each_chunk},
-    skeleton::{Filter, NodalShare, StressPoint, motion},
+    skeleton::{NodalShare, StressPoint, motion},
 };
 use sandboil_soil::{
     Integrator, Moduli, SoilError, UpdateReport,
@@ -129,7 +129,7 @@ impl SoilField {
         geometry: &Geometry,
         velocity: &[Vec2],
         (points, shares): (&mut [StressPoint], &mut [NodalShare]),
-        (filter, dt): (Filter, f64),
+        (filter, dt): (f64, f64),
         integrator: &Integrator,
     ) -> Result<UpdateReport, SolverError> {
         let mut total = UpdateReport::default();

@@ -134,7 +134,7 @@ pub fn region_limit(
     if coupling == PressureCoupling::None {
         return drained;
     }
-    let water = model.water_stiffness(region);
+    let water = model.water_stiffness(model.regions[region].porosity);
     let undrained = (wave(UNDRAINED_COEFFICIENT, skeleton_stiffness + water), Criterion::UndrainedWave);
     let combined = if undrained.0 < drained.0 { undrained } else { drained };
     let diffusivity = model.pressure_diffusivity(region);

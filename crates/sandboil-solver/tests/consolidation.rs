@@ -35,7 +35,7 @@ fn errors(rows: usize, diffusion: Diffusion) -> [f64; 3] {
     let heights: Vec<f64> = model.position.iter().map(|x| x.y).collect();
     let confined = BULK + 4.0 / 3.0 * SHEAR;
     let diffusivity = CONDUCTIVITY / (UNIT_WEIGHT * (1.0 / confined + porosity / water.bulk_modulus));
-    let mut simulation = Simulation::new(model, 1).unwrap();
+    let mut simulation = Simulation::new(&model, 1).unwrap();
     let stage = Shaking {
         duration: 0.5 * HEIGHT * HEIGHT / diffusivity,
         wave: None,

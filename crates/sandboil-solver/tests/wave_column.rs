@@ -48,7 +48,7 @@ fn run(spacing: f64, smoothing_ratio: f64, frequency: f64) -> Outcome {
     model.numerics.smoothing_ratio = smoothing_ratio;
     let interval = 1e-3;
     let velocity = (0..2000).map(|k| ricker(frequency, f64::from(k) * interval - CENTRE)).collect();
-    let mut simulation = Simulation::new(model, 1).unwrap();
+    let mut simulation = Simulation::new(&model, 1).unwrap();
     let probe = Vec2::new(0.5 * spacing, HEIGHT);
     simulation
         .begin_shaking(shaking(Some(UpgoingWave { interval, velocity }), DURATION, vec![probe]))

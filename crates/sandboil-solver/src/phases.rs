@@ -1,0 +1,95 @@
+//! How much solid and water the volume of a node holds (Eqs 1 and 5).
+//!
+//! Grains neither compress nor leave their node, so porosity, density and volume are one unknown: with the volume
+//! `V` moving as `d ln V / dt = div v`, `n = 1 - V_s / V` is Eq. 1 integrated exactly, at any porosity step between
+//! layers. The divergence is that of the stress nodes, whose accumulated strain gives `ln V` for nothing.
+
+use crate::{
+    model::{Model, STRESS_NODES},
+    skeleton::StressPoint,
+};
+use std::ops::RangeInclusive;
+
+/// Porosities a soil can have: outside, a grain packing is no longer described.
+const POROSITY_RANGE: RangeInclusive<f64> = 0.05..=0.95;
+
+/// Volumes, porosities and masses of the velocity nodes.
+#[derive(Debug, Clone)]
+pub struct Phases {
+    /// Volume per unit thickness, m2.
+    volume: Vec<f64>,
+    /// Volume when the strains were last set to zero, m2.
+    unstrained: Vec<f64>,
+    /// Volume of the grains, m2: constant.
+    solid: Vec<f64>,
+    /// Density of the grains, Mg/m3.
+    solid_density: Vec<f64>,
+    /// Density of the water, Mg/m3; zero in a dry section.
+    water_density: f64,
+}
+
+impl Phases {
+    /// The undeformed section.
+    pub fn new(model: &Model) -> Self {
+        let volume = vec![model.spacing.x * model.spacing.y; model.nodes()];
+        let of_region = |value: &dyn Fn(&crate::Region) -> f64| -> Vec<f64> {
+            model.region.iter().map(|&region| value(&model.regions[region as usize])).collect()
+        };
+        let solidity = of_region(&|region| 1.0 - region.porosity);
+        Self {
+            solid: volume.iter().zip(solidity).map(|(v, share)| v * share).collect(),
+            solid_density: of_region(&|region| region.solid_density),
+            water_density: model.water.map_or(0.0, |water| water.unit_weight / model.gravity),
+            unstrained: volume.clone(),
+            volume,
+        }
+    }
+
+    /// Volumes per unit thickness, m2.
+    pub fn volume(&self) -> &[f64] {
+        &self.volume
+    }
+
+    /// Porosity `n`.
+    pub fn porosity(&self, node: usize) -> f64 {
+        1.0 - self.solid[node] / self.volume[node]
+    }
+
+    /// Dry density `rho = (1 - n) rho_s`, Mg/m3.
+    pub fn dry_density(&self, node: usize) -> f64 {
+        self.solid[node] * self.solid_density[node] / self.volume[node]
+    }
+
+    /// Mass of grains and pore water, Mg/m.
+    pub fn mass(&self, node: usize) -> f64 {
+        let pores = self.volume[node] - self.solid[node];
+        self.solid[node] * self.solid_density[node] + pores * self.water_density
+    }
+
+    /// Takes over the volume strain of the stress nodes. Returns how many porosities had to be kept in range.
+    pub fn follow(&mut self, points: &[StressPoint]) -> u64 {
+        let mut clipped = 0;
+        for (node, volume) in self.volume.iter_mut().enumerate() {
+            let own = &points[STRESS_NODES * node..STRESS_NODES * (node + 1)];
+            let strain: f64 = own.iter().map(|point| point.strain[0] + point.strain[1]).sum();
+            let wanted = self.unstrained[node] * (strain / STRESS_NODES as f64).exp();
+            let least = self.solid[node] / (1.0 - POROSITY_RANGE.start());
+            let most = self.solid[node] / (1.0 - POROSITY_RANGE.end());
+            // A soil that begins outside the range may stay where it is.
+            let (least, most) = (least.min(self.unstrained[node]), most.max(self.unstrained[node]));
+            *volume = wanted.clamp(least, most);
+            clipped += u64::from(*volume != wanted);
+        }
+        clipped
+    }
+
+    /// Makes the present volumes those of zero strain: strains start anew with a stage.
+    pub fn restart_strain(&mut self) {
+        self.unstrained.copy_from_slice(&self.volume);
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        4 * size_of_val(self.volume.as_slice())
+    }
+}
