@@ -2,7 +2,8 @@
 
 use sandboil_soil::{Integrator, elastic::Elastic};
 use sandboil_solver::{
-    AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, Soil, Water, stress_node_offset,
+    AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, SHAKING_FACTOR, Shaking, Soil,
+    UpgoingWave, Water, stress_node_offset,
 };
 use sandboil_sph::{Period, Vec2};
 
@@ -68,5 +69,21 @@ pub fn elastic(shear_modulus: f64, bulk_modulus: f64) -> Region {
         hydraulic_conductivity: 0.0,
         earth_pressure_coefficient: 0.5,
         static_poisson_ratio: 1.0 / 3.0,
+    }
+}
+
+/// A shaking stage without damping, envelopes or stress histories; histories at `probes` every millisecond.
+pub fn shaking(wave: Option<UpgoingWave>, duration: f64, probes: Vec<Vec2>) -> Shaking {
+    Shaking {
+        duration,
+        wave,
+        half_space: None,
+        local_damping: 0.0,
+        time_step_factor: SHAKING_FACTOR,
+        probes,
+        history_interval: 0.001,
+        stress_histories: false,
+        pressure_envelope: false,
+        strain_envelope: false,
     }
 }

@@ -1,0 +1,65 @@
+//! States of rest: what gravity leaves, and that the switch to the compliant base starts nothing.
+
+use crate::common::{column, elastic, shaking};
+use sandboil_soil::pm4sand::{Options, PM4Sand, Parameters};
+use sandboil_solver::{Gravity, Model, Operators, Simulation, Soil, Water};
+
+const HEIGHT: f64 = 10.0;
+const SPACING: f64 = 0.4;
+const GRAVITY_STAGE: Gravity = Gravity { tolerance: 1e-5, max_steps: 20_000 };
+const WATER: Water = Water { unit_weight: 10.0, bulk_modulus: 1e6 };
+
+fn sand_column(operators: Operators) -> Model {
+    let mut region = elastic(1.0, 1.0);
+    let parameters = Parameters { dr: 0.55, g0: 677.0, hpo: 0.4, ..Parameters::default() };
+    region.soil = Soil::PM4Sand(Box::new(PM4Sand::new(parameters, Options::default()).unwrap()));
+    region.hydraulic_conductivity = 1e-3;
+    let mut model = column(HEIGHT, SPACING, 1, region, Some(WATER));
+    model.numerics.operators = operators;
+    model
+}
+
+fn at_rest(model: &Model) -> Simulation {
+    let mut simulation = Simulation::new(model, 1).unwrap();
+    simulation.begin_gravity(GRAVITY_STAGE).unwrap();
+    assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
+    simulation
+}
+
+/// Standing on dashpots for 100 s moves nothing: stored reactions include the whole residual, to the last bit.
+#[test]
+fn nothing_moves_after_the_switch_to_the_compliant_base() {
+    for operators in [Operators::Conservative, Operators::Printed] {
+        let mut simulation = at_rest(&sand_column(operators));
+        let before = simulation.displacement();
+        simulation.begin_shaking(shaking(None, 100.0, Vec::new())).unwrap();
+        assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
+        let moved = simulation
+            .displacement()
+            .iter()
+            .zip(&before)
+            .map(|(now, then)| (now[0] - then[0]).hypot(now[1] - then[1]))
+            .fold(0.0, f64::max);
+        println!("{operators:?}: {moved:e} m after 100 s, {} steps", simulation.step());
+        assert!(moved < 1e-9, "{moved}");
+    }
+}
+
+/// Geostatic stress relaxes to a state that differs from the exact one by the outer rows' weights only.
+#[test]
+fn gravity_keeps_the_geostatic_state() {
+    let mut model = column(20.0, 0.2, 1, elastic(8e4, 2.4e5), Some(WATER));
+    for region in &mut model.regions {
+        region.static_poisson_ratio = 1.0 / 3.0;
+    }
+    let simulation = at_rest(&model);
+    // Unit weight under water times spacing: the stress step from row to row.
+    let step = (model.mixture_density(0) * model.gravity - WATER.unit_weight) * model.spacing.y;
+    let exact = &model.vertical_effective_stress;
+    let errors: Vec<f64> =
+        simulation.stress().iter().flatten().zip(exact).map(|(s, e)| (-s[1] - e) / step).collect();
+    let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    println!("rms {rms:.3} rho' g dx, {} steps", simulation.step());
+    assert!(rms < 0.15, "{rms}");
+    assert!(simulation.step() < 600);
+}
