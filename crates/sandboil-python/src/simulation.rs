@@ -118,7 +118,8 @@ impl Simulation {
     #[new]
     fn new(description: &Bound<'_, PyDict>, threads: usize) -> PyResult<Self> {
         let model = model(description)?;
-        let inner = description.py().detach(|| solver::Simulation::new(&model, threads)).map_err(CoreError)?;
+        let inner =
+            description.py().detach(|| solver::Simulation::new(&model, threads)).map_err(CoreError)?;
         Ok(Self { inner })
     }
 

@@ -16,6 +16,8 @@ mod record;
 pub mod simulation;
 mod skeleton;
 mod soil_field;
+#[cfg(test)]
+mod spectrum_tests;
 mod timestep;
 
 pub use base::UpgoingWave;

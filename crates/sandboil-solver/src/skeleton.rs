@@ -197,7 +197,7 @@ pub fn maximum_shear_strain([xx, yy, xy]: [f64; 3]) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::{
         geometry::Wall,
@@ -211,16 +211,25 @@ mod tests {
     const ROWS: usize = 6;
     const NODES: usize = COLUMNS * ROWS;
 
+    /// A free block of nodes at unit spacing, `side` by `side`.
+    pub(crate) fn square_block(side: usize) -> Model {
+        let position = (0..side * side).map(|k| Vec2::new((k % side) as f64, (k / side) as f64)).collect();
+        block(position, None)
+    }
+
     /// A block of unit spacing with disordered nodes; free unless a period is given.
-    fn block(disorder: &[(f64, f64)], period: Option<Period>) -> Model {
-        let position: Vec<Vec2> = disorder
-            .iter()
-            .enumerate()
-            .map(|(k, (a, b))| Vec2::new((k % COLUMNS) as f64 + 0.1 * a, (k / COLUMNS) as f64 + 0.1 * b))
-            .collect();
+    fn disordered(disorder: &[(f64, f64)], period: Option<Period>) -> Model {
+        let place = |(k, (a, b)): (usize, &(f64, f64))| {
+            Vec2::new((k % COLUMNS) as f64 + 0.1 * a, (k / COLUMNS) as f64 + 0.1 * b)
+        };
+        block(disorder.iter().enumerate().map(place).collect(), period)
+    }
+
+    fn block(position: Vec<Vec2>, period: Option<Period>) -> Model {
+        let nodes = position.len();
         Model {
             spacing: Vec2::repeat(1.0),
-            region: vec![0; NODES],
+            region: vec![0; nodes],
             regions: vec![Region {
                 soil: Soil::Elastic(Elastic::new(1.0, 2.0).unwrap()),
                 porosity: 0.5,
@@ -229,8 +238,8 @@ mod tests {
                 earth_pressure_coefficient: 0.5,
                 static_poisson_ratio: 1.0 / 3.0,
             }],
-            surface_elevation: vec![ROWS as f64; NODES],
-            vertical_effective_stress: vec![0.0; STRESS_NODES * NODES],
+            surface_elevation: vec![nodes as f64; nodes],
+            vertical_effective_stress: vec![0.0; STRESS_NODES * nodes],
             pore_pressure: Vec::new(),
             position,
             water: None,
@@ -268,7 +277,7 @@ mod tests {
             shear in vectors(9.0, STRESS_NODES * NODES), wall in 0_u8..4,
         ) {
             let wall_at_base = wall > 0;
-            let mut model = block(&disorder, None);
+            let mut model = disordered(&disorder, None);
             if wall_at_base {
                 model.base_elevation = -0.5;
             }
@@ -301,7 +310,7 @@ mod tests {
             (a, b, c, d) in (-1.0_f64..1.0, -1.0_f64..1.0, -1.0_f64..1.0, -1.0_f64..1.0),
         ) {
             let period = periodic.then_some(Period { width: COLUMNS as f64 });
-            let model = block(&disorder, period);
+            let model = disordered(&disorder, period);
             let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], Wall::NO_SLIP, None);
             let points = vec![StressPoint { shear_modulus: 1e4, density: 1.0, volume: 0.5, ..StressPoint::default() }; STRESS_NODES * NODES];
             let rough: Vec<Vec2> = v.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
@@ -309,7 +318,7 @@ mod tests {
             let power: f64 = force.iter().zip(&rough).map(|(f, v)| f.dot(v)).sum();
             prop_assert!(power < 0.0, "{}", power);
             // Largest eigenvalue of the filter: 1.05 xi C_s / dx, so no more power than that.
-            let bound = 1.1 * 0.1 * 100.0 * rough.iter().map(|v| v.norm_squared()).sum::<f64>();
+            let bound = 1.1 * 0.1 * 100.0 * rough.iter().map(Vec2::norm_squared).sum::<f64>();
             prop_assert!(-power < 2.0 * bound, "{} {}", power, bound);
             if !periodic {
                 let linear: Vec<Vec2> =
