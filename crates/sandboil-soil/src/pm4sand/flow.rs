@@ -187,10 +187,15 @@ impl PM4Sand {
             return 0.0;
         }
         let aiding = positive_part(at.fabric.contract(n));
-        let looseness = positive_part(0.5 - surfaces.state_index);
-        let h_p = self.constants.hpo * (-0.7 + 7.0 * looseness * looseness).exp();
+        let h_p = self.contraction_resistance(surfaces.state_index);
         let rate = memory.ado * (1.0 + aiding) / (h_p * memory.c_dz);
         let path = (at.alpha - memory.alpha_in).contract(n) + SQRT_2 * aiding / memory.limit;
         (rate * path * path).min(CONTRACTION_CAP * memory.ado) * distance / (distance + C_D) * low_pressure
+    }
+    /// `h_p`: resistance to contraction at a state index (manual, section 3.5.1).
+    #[inline]
+    pub(super) fn contraction_resistance(&self, state_index: f64) -> f64 {
+        let density = positive_part(0.5 - state_index);
+        self.constants.hpo * (-0.7 + 7.0 * density * density).exp()
     }
 }

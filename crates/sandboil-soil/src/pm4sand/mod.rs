@@ -5,6 +5,8 @@
 //! deviator `s`; the border types [`Stress`] and [`StrainIncrement`] are tension positive. The whole state lives
 //! in a frame that turns with the material, which is exactly the Jaumann rate for every tensor at once.
 
+#[cfg(test)]
+mod check_values;
 mod flow;
 mod initialise;
 mod integrate;

@@ -33,6 +33,16 @@ pub fn shear(xy: f64) -> StrainIncrement {
     StrainIncrement { xy, ..StrainIncrement::default() }
 }
 
+/// Updates a state that cannot fail.
+pub fn advance(
+    sand: &PM4Sand,
+    state: &mut State,
+    increment: &StrainIncrement,
+    integrator: &Integrator,
+) -> UpdateReport {
+    sand.update(state, increment, integrator).unwrap()
+}
+
 /// Vertical stress `SIGMA_V0` with `K_0 = 0.5`, kPa, tension positive.
 pub fn anisotropic() -> Stress {
     Stress { xx: -0.5 * SIGMA_V0, yy: -SIGMA_V0, xy: 0.0, zz: -0.5 * SIGMA_V0 }
@@ -131,7 +141,7 @@ impl StrainPath {
         for (increment, row) in self.legs() {
             let (count, part) = parts(&increment, host_increment);
             for _ in 0..count {
-                difference.report += sand.update(&mut state, &part, integrator).unwrap();
+                difference.report += advance(sand, &mut state, &part, integrator);
             }
             let stress = sand.stress(&state);
             for (ours, theirs) in [stress.xx, stress.yy, stress.xy].into_iter().zip(row.stress) {
@@ -142,4 +152,62 @@ impl StrainPath {
         difference.rms = (squares / (3 * (self.rows.len() - 1)) as f64).sqrt();
         difference
     }
+}
+
+/// Cyclic simple shear at constant volume, reversed exactly where the shear stress reaches `csr * SIGMA_V0`.
+#[derive(Debug, Default)]
+pub struct CyclicShear {
+    /// Vertical effective stress at the end of each half cycle, kPa, compression positive.
+    pub vertical_stress: Vec<f64>,
+    /// Cycles until the shear strain first reaches 3 %, the last half cycle by its share in shear stress.
+    pub cycles: f64,
+    /// Cumulative fabric when the shear strain first reaches 3.5 %.
+    pub cumulative_fabric: f64,
+    /// Shear strain travelled to 3.5 %.
+    pub travel: f64,
+    pub report: UpdateReport,
+}
+
+/// Cyclic shear from [`consolidated`] to 3.5 % shear strain, in steps of `step`, first load positive. A test that
+/// never liquefies ends after 60 half cycles and gives infinite cycles.
+pub fn cyclic_shear(sand: &PM4Sand, csr: f64, integrator: &Integrator, step: f64) -> CyclicShear {
+    const COUNTED: f64 = 0.03;
+    const LAST: f64 = 0.035;
+    let target = csr * SIGMA_V0;
+    let mut test = CyclicShear { cycles: f64::INFINITY, ..CyclicShear::default() };
+    let mut state = consolidated(sand);
+    let (mut strain, mut direction, mut stress) = (0.0_f64, 1.0, 0.0);
+    while strain.abs() < LAST && test.vertical_stress.len() < 60 {
+        // What is left to the target after a share of a step.
+        let moved = |share: f64| {
+            let mut next = state;
+            let report = advance(sand, &mut next, &shear(direction * share * step), integrator);
+            (next, report, direction * sand.stress(&next).xy - target)
+        };
+        let (mut next, mut report, mut excess) = moved(1.0);
+        let (mut low, mut high, mut share) = (0.0, 1.0, 1.0);
+        let reverses = excess >= 0.0;
+        while reverses && excess.abs() > 1e-9 * target && high - low > 1e-12 {
+            share = 0.5 * (low + high);
+            (next, report, excess) = moved(share);
+            if excess >= 0.0 { high = share } else { low = share }
+        }
+        let (before, stress_before) = (strain, stress);
+        strain += direction * share * step;
+        stress = sand.stress(&next).xy;
+        test.report += report;
+        test.travel += share * step;
+        state = next;
+        if strain.abs() >= COUNTED && test.cycles.is_infinite() {
+            let within = (COUNTED - before.abs()) / (strain.abs() - before.abs());
+            let tau = direction * (stress_before + within * (stress - stress_before));
+            test.cycles = 0.5 * (test.vertical_stress.len() as f64 + 0.5 * (tau / target + 1.0));
+        }
+        if reverses {
+            test.vertical_stress.push(-sand.stress(&state).yy);
+            direction = -direction;
+        }
+    }
+    test.cumulative_fabric = state.cumulative_fabric();
+    test
 }

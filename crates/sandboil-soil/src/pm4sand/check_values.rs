@@ -1,0 +1,231 @@
+//! Constants, initial values and single evaluations against numbers of an independent program (Python, same
+//! equations; its trajectories agree with OpenSees 3.7.1). Printed figures, to the last digit.
+
+use super::{
+    PM4Sand, Parameters, State,
+    rates::{Memory, Point, Reading, direction},
+    state::{Components, Strain},
+    surfaces::stress_ratio,
+};
+use crate::{Deviator, Moduli, Stress};
+
+/// `value` rounds to the printed figure; zero is meant exactly.
+fn agrees(name: &str, value: f64, printed: &str) {
+    let (mantissa, exponent) = printed.split_once('e').unwrap_or((printed, "0"));
+    let decimals = mantissa.split_once('.').map_or(0, |(_, after)| after.len());
+    let unit = 10.0_f64.powi(exponent.parse::<i32>().unwrap() - i32::try_from(decimals).unwrap());
+    let expected: f64 = printed.parse().unwrap();
+    let allowed = if expected == 0.0 { 0.0 } else { 0.501 * unit };
+    assert!((value - expected).abs() <= allowed, "{name}: {value} instead of {printed}");
+}
+
+fn sand(dr: f64, g0: f64, hpo: f64) -> PM4Sand {
+    PM4Sand::new(Parameters { dr, g0, hpo, ..Parameters::default() }, super::Options::default()).unwrap()
+}
+
+/// One atmosphere of vertical stress, half of it horizontally.
+fn start(sand: &PM4Sand) -> State {
+    sand.initialise(Stress { xx: -50.65, yy: -101.3, xy: 0.0, zz: -50.65 }).unwrap()
+}
+
+fn traceless(half_difference: f64, xy: f64) -> Deviator {
+    Deviator { half_difference, xy }
+}
+
+#[test]
+fn constants_and_initial_values() {
+    #[rustfmt::skip]
+    let rows = [
+        (0.35, 476.0, 0.53, ["0.30", "0.5", "5.0000", "5.1604", "0.07453", "-0.086032", "1.18308", "1.137157",
+            "1.079947", "1.259314", "2.912926", "39292.27", "85133.25"]),
+        (0.55, 677.0, 0.40, ["0.40", "0.5", "10.0000", "10.3656", "0.12536", "-0.286032", "4.00732", "1.256753",
+            "1.058563", "1.305635", "15.008788", "57040.67", "123588.11"]),
+        (0.75, 890.0, 0.63, ["0.50", "0.2", "10.0000", "30.8828", "0.21086", "-0.486032", "13.57353", "1.388927",
+            "1.037602", "1.364229", "282.529064", "76006.12", "164679.92"]),
+    ];
+    for (dr, g0, hpo, expected) in rows {
+        let sand = sand(dr, g0, hpo);
+        let state = start(&sand);
+        let c = sand.parameters();
+        let surfaces = sand.surfaces(state.mean, c.initial_void_ratio());
+        let values = [
+            ("h_o", c.ho),
+            ("c_eps", c.ce),
+            ("C_DR", c.c_dr),
+            ("C_kaf", c.c_kaf),
+            ("F_sed,min", c.f_sed_min),
+            ("xi_R0", surfaces.state_index),
+            ("z_max", state.fabric_limit),
+            ("M^b", surfaces.bounding),
+            ("M^d", surfaces.dilatancy),
+            ("A_do", state.dilatancy_scale),
+            ("h_p", sand.contraction_resistance(surfaces.state_index)),
+            ("G", state.moduli.shear),
+            ("K", state.moduli.bulk),
+        ];
+        for ((name, value), printed) in values.into_iter().zip(expected) {
+            agrees(name, value, printed);
+        }
+        agrees("M", c.critical_ratio, "1.089278");
+        agrees("p_min", state.p_min, "0.5065");
+    }
+}
+
+/// A state of the middle calibration and what the rate equations say there.
+struct Evaluation {
+    /// (mean, half difference, xy), kPa, compression positive.
+    stress: (f64, f64, f64),
+    fabric: Deviator,
+    fabric_in: Deviator,
+    alpha_in: Deviator,
+    alpha_in_previous: Deviator,
+    /// `z_cum`, `z_peak`, `p_zp`.
+    history: (f64, f64, f64),
+    surfaces: [&'static str; 4],
+    moduli: [&'static str; 2],
+    /// D, `K_p`, h, `b:n`, `(alpha^d - alpha):n`.
+    flow: [&'static str; 5],
+    /// L, then the change of stress (xx, yy, xy), of alpha (xx, xy) and of z (xx, xy) per 1e-6 of shear strain.
+    change: [&'static str; 8],
+}
+
+impl Evaluation {
+    fn check(&self) {
+        let sand = sand(0.55, 677.0, 0.40);
+        let mut state = start(&sand);
+        let n = traceless(0.1, 0.7);
+        let (mean, half_difference, xy) = self.stress;
+        state.mean = mean;
+        state.deviator = traceless(half_difference, xy);
+        state.alpha = state.deviator * (1.0 / mean) - n * (0.01 / std::f64::consts::SQRT_2);
+        (state.fabric, state.fabric_in) = (self.fabric, self.fabric_in);
+        state.alpha_in = Components::of(self.alpha_in);
+        state.alpha_in_true = self.alpha_in;
+        state.alpha_in_previous = Components::of(self.alpha_in_previous);
+        (state.fabric_cumulative, state.fabric_peak, state.p_zp) = self.history;
+
+        let void_ratio = sand.void_ratio(&state);
+        let surfaces = sand.surfaces(mean.max(state.p_min), void_ratio);
+        state.bounding_ratio = surfaces.bounding;
+        sand.refresh_moduli(&mut state);
+        let Moduli { bulk, shear } = state.moduli;
+        let ratio = stress_ratio(mean, state.deviator);
+        let names = ["xi_R", "M^b", "M^d", "M_cur"];
+        let values = [surfaces.state_index, surfaces.bounding, surfaces.dilatancy, ratio];
+        for ((name, value), printed) in names.into_iter().zip(values).zip(self.surfaces) {
+            agrees(name, value, printed);
+        }
+        agrees("G", shear, self.moduli[0]);
+        agrees("K", bulk, self.moduli[1]);
+
+        let at = Point::of(&state);
+        let memory = Memory::of(&sand, &state);
+        let found = direction(at.p, at.s, at.alpha, sand.constants.p_atm);
+        assert!((found - n).norm() < 1e-12);
+        let flow = sand.flow(n, &at, &memory, surfaces, shear, true);
+        let names = ["D", "K_p", "h", "b:n", "distance"];
+        let values =
+            [flow.dilatancy, flow.plastic_modulus, flow.hardening, flow.b_n, flow.dilatancy_distance];
+        for ((name, value), printed) in names.into_iter().zip(values).zip(self.flow) {
+            agrees(name, value, printed);
+        }
+
+        let step = Strain { volume: 0.0, deviator: traceless(0.0, 0.5e-6) };
+        let reading = Reading { held_moduli: None, clamp: true };
+        let mut bounding = f64::NAN;
+        let change = sand.change(&at, &memory, void_ratio, step, reading, &mut bounding).unwrap();
+        let names = ["L", "ds_xx", "ds_yy", "ds_xy", "dalpha_xx", "dalpha_xy", "dz_xx", "dz_xy"];
+        let values = [
+            change.loading_index,
+            change.p + change.s.half_difference,
+            change.p - change.s.half_difference,
+            change.s.xy,
+            change.alpha.half_difference,
+            change.alpha.xy,
+            change.fabric.half_difference,
+            change.fabric.xy,
+        ];
+        for ((name, value), printed) in names.into_iter().zip(values).zip(self.change) {
+            agrees(name, value, printed);
+        }
+        assert_eq!(bounding, surfaces.bounding);
+    }
+}
+
+#[test]
+fn evaluation_while_contracting() {
+    Evaluation {
+        stress: (59.0, -11.0, 9.0),
+        fabric: traceless(0.3, 0.6),
+        fabric_in: traceless(0.1, 0.2),
+        alpha_in: traceless(-0.2, -0.10),
+        alpha_in_previous: traceless(-0.25, 0.12),
+        history: (2.0, 1.2, 60.0),
+        surfaces: ["-0.297278", "1.263839", "1.057373", "0.481785"],
+        moduli: ["38851.0595", "84177.2956"],
+        flow: ["0.07401091", "65665.785", "2327.1163", "0.71739822", "0.57140429"],
+        change: [
+            "3.823124e-7",
+            "-5.352469e-3",
+            "5.888275e-4",
+            "1.805652e-2",
+            "1.635880e-4",
+            "2.805630e-4",
+            "0",
+            "0",
+        ],
+    }
+    .check();
+}
+
+#[test]
+fn evaluation_while_dilating() {
+    Evaluation {
+        stress: (22.0, -2.0, 12.5),
+        fabric: traceless(-0.6, -2.2),
+        fabric_in: traceless(0.2, 0.5),
+        alpha_in: traceless(0.02, -0.35),
+        alpha_in_previous: traceless(0.0, 0.30),
+        history: (14.0, 4.5, 50.0),
+        surfaces: ["-0.333296", "1.286806", "1.053571", "1.150817"],
+        moduli: ["12229.5526", "26497.3641"],
+        flow: ["-0.01584791", "731.0597", "375.8018", "0.13263635", "-0.03228535"],
+        change: [
+            "6.709906e-7",
+            "-1.359415e-3",
+            "1.922951e-3",
+            "7.412722e-4",
+            "3.057854e-5",
+            "1.155807e-5",
+            "1.913597e-5",
+            "-5.811045e-5",
+        ],
+    }
+    .check();
+}
+
+#[test]
+fn evaluation_near_the_pressure_floor() {
+    Evaluation {
+        stress: (0.85, -0.05, 0.3),
+        fabric: traceless(-0.6, -2.2),
+        fabric_in: traceless(0.2, 0.5),
+        alpha_in: traceless(0.02, -0.35),
+        alpha_in_previous: traceless(0.0, 0.30),
+        history: (14.0, 4.5, 50.0),
+        surfaces: ["-0.402586", "1.332169", "1.046296", "0.715619"],
+        moduli: ["3387.1422", "7338.8081"],
+        flow: ["0", "448.1804", "1720.7367", "0.45963260", "0.25749023"],
+        change: [
+            "6.565624e-7",
+            "-4.447741e-4",
+            "4.447741e-4",
+            "2.737238e-4",
+            "1.152533e-4",
+            "2.308112e-4",
+            "0",
+            "0",
+        ],
+    }
+    .check();
+}
