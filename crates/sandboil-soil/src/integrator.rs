@@ -24,8 +24,9 @@ pub enum Integrator {
 impl Integrator {
     /// Largest strain component of a committed part with [`Integrator::Reference`].
     pub const REFERENCE_INCREMENT: f64 = 2.5e-6;
-    /// Default largest strain component of a committed part.
-    pub const DEFAULT_INCREMENT: f64 = 2e-5;
+    /// Default largest strain component of a committed part. Reversals are looked for once per part: above 5e-6 a
+    /// path whose direction turns nearly tangentially finds ones that are not there (`docs/theory/pm4sand.md`).
+    pub const DEFAULT_INCREMENT: f64 = 5e-6;
     /// Default relative error per sub-step.
     pub const DEFAULT_TOLERANCE: f64 = 1e-5;
 

@@ -28,3 +28,18 @@ fn rows_are_whole_commits_apart() {
         }
     }
 }
+
+/// On the third path a reversal is nearly neutral: the reference itself moves by 0.1 kPa with twice its commit.
+#[test]
+fn default_part_finds_the_reversals_of_the_reference() {
+    let rk4 = Integrator::RungeKutta4 { max_increment: Integrator::DEFAULT_INCREMENT };
+    for integrator in [Integrator::default(), rk4] {
+        for (path, (allowed_rms, reversals)) in
+            StrainPath::all().into_iter().zip([(0.01, 28), (0.01, 12), (0.2, 12)])
+        {
+            let difference = path.compare(&sand(path.calibration), &integrator, 1e-4);
+            assert!(difference.rms <= allowed_rms, "{}: {} kPa", path.name, difference.rms);
+            assert_eq!(difference.report.reversals, reversals, "{}", path.name);
+        }
+    }
+}
