@@ -1,1 +1,71 @@
-"""What an earthquake does to saturated ground."""
+"""What an earthquake does to saturated ground.
+
+Stress-particle SPH with coupled pore water and PM4Sand. Units kN, m, s, Mg; x horizontal, y up; stresses and
+pressures reported to people are positive in compression. Start with :class:`Scene` and :func:`run`.
+"""
+
+from ._core import __version__
+from ._errors import InvalidInput, RunInterrupted, SandboilError, SimulationDiverged
+from .discretise import Discretisation, discretise
+from .materials import Elastic, PM4Sand
+from .motion import Motion, ResponseSpectrum, response_spectrum
+from .plan import Plan
+from .results import History, Profile, Run, Summary, Surface, load
+from .run import run
+from .scene import (
+    Box,
+    CompliantBase,
+    Gravity,
+    MotionSpec,
+    Numerics,
+    Output,
+    Periodic,
+    Polygon,
+    Region,
+    Scene,
+    Shaking,
+    Water,
+    WaterTable,
+    box,
+    polygon,
+)
+from .simulation import Simulation
+
+__all__ = [
+    "Box",
+    "CompliantBase",
+    "Discretisation",
+    "Elastic",
+    "Gravity",
+    "History",
+    "InvalidInput",
+    "Motion",
+    "MotionSpec",
+    "Numerics",
+    "Output",
+    "PM4Sand",
+    "Periodic",
+    "Plan",
+    "Polygon",
+    "Profile",
+    "Region",
+    "ResponseSpectrum",
+    "Run",
+    "RunInterrupted",
+    "SandboilError",
+    "Scene",
+    "Shaking",
+    "Simulation",
+    "SimulationDiverged",
+    "Summary",
+    "Surface",
+    "Water",
+    "WaterTable",
+    "__version__",
+    "box",
+    "discretise",
+    "load",
+    "polygon",
+    "response_spectrum",
+    "run",
+]

@@ -500,6 +500,14 @@ class Shaking(Model):
             raise InvalidInput("stage.duration", None, "is required when there is no motion", "in seconds")
         return self
 
+    @property
+    def resolved_duration(self) -> float:
+        """Duration in s: as given, or else that of the motion, which is read for it."""
+        if self.duration is not None:
+            return self.duration
+        assert self.motion is not None
+        return self.motion.load().duration
+
 
 Stage = Annotated[Gravity | Shaking, Field(discriminator="kind")]
 

@@ -10,6 +10,8 @@ mod _core {
     use pyo3::prelude::*;
 
     #[pymodule_export]
+    use crate::material::small_strain_moduli;
+    #[pymodule_export]
     use crate::simulation::{Simulation, stress_node_offset};
 
     #[pymodule_init]

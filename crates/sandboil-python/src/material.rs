@@ -3,7 +3,7 @@
 use crate::errors::CoreError;
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
 use sandboil_soil::{
-    Integrator, SoilError,
+    Integrator, SoilError, Stress,
     elastic::Elastic,
     pm4sand::{Options, PM4Sand, Parameters},
 };
@@ -72,6 +72,21 @@ pub fn soil(dict: &Bound<'_, PyDict>, gap_memory: bool) -> PyResult<Soil> {
         "pm4sand" => Ok(Soil::PM4Sand(Box::new(pm4sand(dict, gap_memory)?))),
         other => Err(PyValueError::new_err(format!("unknown material kind {other:?}"))),
     }
+}
+
+/// Shear and bulk modulus, kPa, of a soil at rest under the effective stress `(xx, yy, xy, zz)`, kPa, tension
+/// positive.
+#[pyfunction]
+pub fn small_strain_moduli(material: &Bound<'_, PyDict>, stress: [f64; 4]) -> PyResult<(f64, f64)> {
+    let moduli = match soil(material, false)? {
+        Soil::Elastic(elastic) => elastic.moduli(),
+        Soil::PM4Sand(sand) => {
+            let [xx, yy, xy, zz] = stress;
+            let state = sand.initialise(Stress { xx, yy, xy, zz }).map_err(|error| refused(&error))?;
+            sand.moduli(&state)
+        }
+    };
+    Ok((moduli.shear, moduli.bulk))
 }
 
 /// An integrator by its name, with what the user changed of it.

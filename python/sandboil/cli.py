@@ -1,0 +1,101 @@
+"""The command `sandboil`. Exit codes: 0 done, 2 bad input refused before any work, 3 the run stopped itself
+and kept its results, 130 interrupted."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ._errors import InvalidInput, RunInterrupted, SandboilError
+from .motion import Kind, Motion
+from .plan import plan as plan_of
+from .results import FILE_NAME
+from .run import Accuracy
+from .run import run as run_scene
+from .scene import Scene
+
+EXIT_INVALID = 2
+EXIT_STOPPED = 3
+EXIT_INTERRUPTED = 130
+
+app = typer.Typer(
+    help="What an earthquake does to saturated ground.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+motion_app = typer.Typer(help="Look at ground motions and convert them.", no_args_is_help=True)
+app.add_typer(motion_app, name="motion")
+
+SceneFile = Annotated[Path, typer.Argument(help="Scene as a TOML file.", metavar="SCENE")]
+MotionOption = Annotated[
+    Path | None, typer.Option("--motion", help="Shake by this record (.AT2 or CSV) instead of the scene's.")
+]
+UnitOption = Annotated[
+    str | None, typer.Option(help="Unit of a CSV's values: g, m/s2, cm/s2 or m/s, unless its header says it.")
+]
+ColumnOption = Annotated[str | None, typer.Option(help="Column of a CSV, by its name.")]
+ThreadsOption = Annotated[int, typer.Option(help="Threads; the results do not depend on their number.")]
+AccuracyOption = Annotated[Accuracy, typer.Option(help="Fills the numerics that the scene leaves open.")]
+MotionFile = Annotated[Path, typer.Argument(help="Record: PEER .AT2, or CSV with a header.", metavar="FILE")]
+KindOption = Annotated[Kind, typer.Option(help="Where the motion is one of.")]
+
+
+def _scene(path: Path, motion: Path | None, unit: str | None, column: str | None) -> Scene:
+    scene = Scene.from_toml(path)
+    if motion is not None:
+        return scene.with_motion(Motion.from_file(motion, unit=unit, column=column))
+    for name, value in (("--unit", unit), ("--column", column)):
+        if value is not None:
+            raise InvalidInput(name, value, "belongs to a --motion", "name the record, or leave it out")
+    return scene
+
+
+@app.command()
+def plan(
+    scene: SceneFile,
+    motion: MotionOption = None,
+    unit: UnitOption = None,
+    column: ColumnOption = None,
+    accuracy: AccuracyOption = "standard",
+    threads: ThreadsOption = 2,
+) -> None:
+    """Tell what a run would compute and cost, from a trial of some seconds. Writes nothing."""
+    typer.echo(str(plan_of(_scene(scene, motion, unit, column), threads, accuracy)))
+
+
+@app.command()
+def run(
+    scene: SceneFile,
+    out: Annotated[Path, typer.Option(help="Folder for the results; must not hold a run.")],
+    motion: MotionOption = None,
+    unit: UnitOption = None,
+    column: ColumnOption = None,
+    accuracy: AccuracyOption = "standard",
+    threads: ThreadsOption = 2,
+) -> None:
+    """Compute a scene. Ctrl-C ends it with readable results."""
+    try:
+        results = run_scene(_scene(scene, motion, unit, column), out, threads=threads, accuracy=accuracy)
+    except InvalidInput:
+        raise
+    except SandboilError as error:
+        error.add_note(f"results until then: {out / FILE_NAME}")
+        raise
+    typer.echo(str(results.summary()))
+
+
+def main() -> None:
+    """Run the command line and exit with its code."""
+    try:
+        app()
+    except SandboilError as error:
+        typer.echo(f"sandboil: {error}", err=True)
+        for note in getattr(error, "__notes__", ()):
+            typer.echo(note, err=True)
+        if isinstance(error, InvalidInput):
+            sys.exit(EXIT_INVALID)
+        sys.exit(EXIT_INTERRUPTED if isinstance(error, RunInterrupted) else EXIT_STOPPED)

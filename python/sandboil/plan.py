@@ -1,0 +1,248 @@
+"""What a scene would cost, measured on the scene itself before anything is written."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import _core
+from .discretise import discretise
+from .motion import Motion
+from .motion._motion import SIGNIFICANT
+from .scene import Gravity, Scene
+from .simulation import LOOK_INTERVAL, Simulation, material_description
+
+# Wall time for which each stage is tried, s: long enough for thousands of steps of a column.
+TRIAL_SECONDS = 1.5
+
+# Skempton's B below which compressible water, not the soil, begins to decide the pore pressure: stiff sand
+# under natural water (2.2e6 kPa) has 0.95.
+LEAST_COEFFICIENT = 0.9
+
+_BYTES_PER_MB = 1.0e6
+
+
+@dataclass(frozen=True)
+class StagePlan:
+    """Cost of one stage.
+
+    Attributes
+    ----------
+    name : of the stage
+    duration : s; None for gravity, which ends at rest
+    dt, dt_limit : time step at the beginning, s, and what limits it
+    steps : expected; None where they cannot be told before
+    step_time : wall time of a step in the trial, s
+    trial_steps : number of steps of the trial
+    wall_time : expected, s; None where it cannot be told before
+    """
+
+    name: str
+    duration: float | None
+    dt: float
+    dt_limit: str
+    steps: int | None
+    step_time: float
+    trial_steps: int
+    wall_time: float | None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What would be computed and what it would cost. As text, a page for people.
+
+    Attributes
+    ----------
+    nodes, stress_nodes, pairs : numbers of nodes and of stress-velocity node pairs
+    spacing : (dx, dy), m
+    threads : that the trial ran on
+    accuracy : preset that filled what the scene leaves open
+    physics : (name, active, reason) of all that can be switched off
+    stages : cost of each
+    arrays : bytes of the core's arrays by name, in the last stage
+    file_size : of the results before compression, bytes
+    pore_pressure_coefficients : Skempton's B of each region, the lowest in it; empty without water
+    """
+
+    nodes: int
+    stress_nodes: int
+    pairs: int
+    spacing: tuple[float, float]
+    threads: int
+    accuracy: str
+    physics: list[tuple[str, bool, str]]
+    stages: list[StagePlan]
+    arrays: dict[str, int]
+    file_size: int
+    pore_pressure_coefficients: dict[str, float]
+
+    @property
+    def wall_time(self) -> float | None:
+        """Expected wall time of all stages, s; None if one of them cannot be told."""
+        known = [stage.wall_time for stage in self.stages if stage.wall_time is not None]
+        return sum(known) if len(known) == len(self.stages) else None
+
+    def __str__(self) -> str:
+        dx, dy = self.spacing
+        lines = [
+            f"nodes         {self.nodes}, spacing {dx:g} x {dy:g} m",
+            f"stress nodes  {self.stress_nodes}, {self.pairs} pairs with nodes",
+            "",
+            "physics",
+            *(f"  {'on ' if on else 'off'}  {name:<20}  {reason}" for name, on, reason in self.physics),
+            "",
+            "stages",
+            *(f"  {line}" for stage in self.stages for line in _stage_lines(stage)),
+            "",
+            f"wall time     {_duration(self.wall_time)}, threads: {self.threads}. From a trial of up to "
+            f"{TRIAL_SECONDS:g} s a stage, of shaking in its strong",
+            "              part: a step costs less at rest, and more in liquefied sand.",
+            f"memory        {sum(self.arrays.values()) / _BYTES_PER_MB:.3g} MB in "
+            f"{', '.join(f'{name} {size / _BYTES_PER_MB:.2g}' for name, size in self.arrays.items())}",
+            f"results file  up to {self.file_size / _BYTES_PER_MB:.3g} MB before compression",
+        ]
+        if self.pore_pressure_coefficients:
+            lines += ["", "pore pressure coefficient B, the lowest in each region"]
+            lines += [
+                f"  {name}  {described_coefficient(value)}"
+                for name, value in self.pore_pressure_coefficients.items()
+            ]
+        lines += [
+            "",
+            f"accuracy      {self.accuracy}; how much error each preset saves or costs is not measured yet",
+        ]
+        return "\n".join(lines)
+
+
+def _stage_lines(stage: StagePlan) -> list[str]:
+    told = f"{stage.duration:g} s" if stage.duration is not None else "to rest"
+    steps = f"{stage.steps} steps" if stage.steps is not None else "number of steps not known before"
+    return [
+        f"{stage.name}: {told}, {steps} of {stage.dt:.3g} s, limited by the {stage.dt_limit}",
+        f"  {_duration(stage.wall_time)}, {stage.step_time * 1e3:.3g} ms a step in a trial of "
+        f"{stage.trial_steps} steps",
+    ]
+
+
+def _duration(seconds: float | None) -> str:
+    if seconds is None:
+        return "not known before"
+    if seconds < 90.0:
+        return f"about {seconds:.2g} s"
+    return f"about {seconds / 60.0:.2g} min" if seconds < 5400.0 else f"about {seconds / 3600.0:.2g} h"
+
+
+def described_coefficient(value: float) -> str:
+    """Skempton's B with a warning where it is too low for water that hardly compresses."""
+    if value >= LEAST_COEFFICIENT:
+        return f"{value:.3f}"
+    return (
+        f"{value:.3f}, below {LEAST_COEFFICIENT:g}: the water's bulk modulus is low for this soil, and pore "
+        "pressures will be too"
+    )
+
+
+def pore_pressure_coefficients(scene: Scene) -> dict[str, float]:
+    """Skempton's B = (K_f/n)/(K_f/n + K) of each region where it is lowest: at its highest geostatic stress.
+
+    K is the small-strain bulk modulus of the region's soil. Empty without water.
+    """
+    if scene.water is None:
+        return {}
+    particles = discretise(scene)
+    coefficients = {}
+    for index, region in enumerate(scene.regions):
+        vertical = -float(particles.sigma_v_eff0[particles.region == index].max())
+        lateral = region.K0 * vertical
+        _, bulk = _core.small_strain_moduli(material_description(region), (lateral, vertical, 0.0, lateral))
+        water = scene.water.bulk_modulus / region.resolved(scene).porosity
+        coefficients[region.name] = water / (water + bulk)
+    return coefficients
+
+
+def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
+    """What a run of the scene would compute and cost, from a trial of some seconds that writes nothing.
+
+    Raises :class:`InvalidInput` for what a run would refuse.
+    """
+    from .run import with_accuracy
+
+    scene = with_accuracy(scene, accuracy)
+    simulation = Simulation(_from_strong_part(scene), threads)
+    stages = []
+    for index, stage in enumerate(scene.stages):
+        if index > 0:
+            simulation.begin_next_stage()
+        dt, dt_limit = simulation.dt, simulation.dt_limit
+        start = time.perf_counter()
+        trial_end = start + TRIAL_SECONDS
+        done = False
+        while not done and time.perf_counter() < trial_end:
+            done = simulation.advance(np.inf, LOOK_INTERVAL)
+        spent, made = time.perf_counter() - start, simulation.steps
+        duration = None if isinstance(stage, Gravity) else stage.resolved_duration
+        step_time = spent / max(made, 1)
+        steps = made if done else None if duration is None else round(duration / dt)
+        stages.append(
+            StagePlan(
+                name=scene.stage_names[index],
+                duration=duration,
+                dt=dt,
+                dt_limit=dt_limit,
+                steps=steps,
+                step_time=step_time,
+                trial_steps=made,
+                wall_time=None if steps is None else steps * step_time,
+            )
+        )
+    return Plan(
+        nodes=len(simulation.particles.position),
+        stress_nodes=simulation.stress_nodes,
+        pairs=simulation.pairs,
+        spacing=simulation.particles.spacing,
+        threads=threads,
+        accuracy=accuracy,
+        physics=_physics(scene, simulation),
+        stages=stages,
+        arrays=simulation.arrays(),
+        file_size=_file_size(scene, simulation, stages),
+        pore_pressure_coefficients=pore_pressure_coefficients(scene),
+    )
+
+
+def _physics(scene: Scene, simulation: Simulation) -> list[tuple[str, bool, str]]:
+    """The scene's active physics; what was left to the solver as the last stage has chosen it."""
+    scheme = simulation.flow_scheme
+    chosen = scene.uses_acceleration_term and "acceleration" not in scheme
+    return [
+        (name, False, f"pore pressure diffusion is {scheme}")
+        if chosen and name == "water acceleration"
+        else (name, on, reason)
+        for name, on, reason in scene.active_physics()
+    ]
+
+
+def _from_strong_part(scene: Scene) -> Scene:
+    """The scene with its motions cut to begin where strong shaking does: a quiet start would tell nothing."""
+    for stage in scene.stages:
+        if isinstance(stage, Gravity) or stage.motion is None:
+            continue
+        motion = stage.motion.load()
+        intensity = np.cumsum(motion.acceleration_g**2)
+        begin = min(int(np.searchsorted(intensity, SIGNIFICANT[0] * intensity[-1])), len(intensity) - 2)
+        return scene.with_motion(Motion(dt=motion.dt, velocity=motion.velocity[begin:], kind=motion.kind))
+    return scene
+
+
+def _file_size(scene: Scene, simulation: Simulation, stages: list[StagePlan]) -> int:
+    """Bytes of the frames and histories of a whole run, uncompressed."""
+    duration = sum(stage.duration for stage in stages if stage.duration is not None)
+    components = 3 + sum(3 if simulation.field(name).ndim == 2 else 1 for name in simulation.field_names)
+    frames = duration / scene.output.field_dt + len(stages)
+    samples = duration / scene.output.history_dt
+    channels = len(simulation.take_histories()[1]) * len(simulation.probes)
+    return round(
+        np.float64().nbytes * (frames * components * len(simulation.particles.position) + samples * channels)
+    )

@@ -1,0 +1,421 @@
+"""Stepping a scene from Python: the numerical core, driven through its stages and read in users' terms."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from ._errors import InvalidInput, SandboilError, nearest_name
+from .discretise import Discretisation, Floats, discretise
+from .motion import Motion
+from .scene import Gravity, Region, Scene, Shaking
+
+# How long the core computes before it looks whether the user wants to stop, s.
+LOOK_INTERVAL = 0.1
+
+# More steps than any stage makes; the core counts in 64 bits.
+_NO_LIMIT = 2**62
+
+# Porosity handed on for a dry soil that leaves it open: only (1 - n) times the grain density is ever used.
+_NOMINAL_POROSITY = 0.5
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a stored quantity is: its unit and one line about it, with its sign."""
+
+    unit: str
+    description: str
+
+
+# Every quantity that can be read of a run, in the order in which it is written.
+FIELDS: dict[str, Quantity] = {
+    "displacement": Quantity("m", "since the scene was made, (x, y)"),
+    "velocity": Quantity("m/s", "(x, y)"),
+    "acceleration": Quantity("m/s2", "(x, y)"),
+    "excess_pore_pressure": Quantity("kPa", "since the stage began, compression positive"),
+    "pore_pressure": Quantity("kPa", "hydrostatic and excess, compression positive"),
+    "r_u": Quantity("1", "excess pore pressure over the geostatic vertical effective stress"),
+    "r_u_stress": Quantity("1", "one minus vertical effective stress over its geostatic value"),
+    "sigma_v_eff": Quantity("kPa", "vertical effective stress, compression positive"),
+    "sigma_h_eff": Quantity("kPa", "horizontal effective stress, compression positive"),
+    "p_eff": Quantity("kPa", "mean of the three normal effective stresses, compression positive"),
+    "tau_xy": Quantity("kPa", "shear stress, positive with a positive gamma_xy"),
+    "gamma_xy": Quantity("1", "engineering shear strain since the stage began"),
+    "gamma_max": Quantity("1", "largest engineering shear strain in the plane since the stage began"),
+}
+
+# Fields that exist only with water.
+WATER_FIELDS = ("excess_pore_pressure", "pore_pressure", "r_u")
+
+# Fields of which the largest value over all steps can be kept.
+ENVELOPES = ("r_u", "gamma_max")
+
+# The core's history channels: the name here, and the factor that turns its tension positive into ours.
+_CHANNELS: dict[str, tuple[str, float]] = {
+    "stress_xx": ("sigma_h_eff", -1.0),
+    "stress_yy": ("sigma_v_eff", -1.0),
+    "stress_xy": ("tau_xy", 1.0),
+    "strain_xx": ("epsilon_h", -1.0),
+    "strain_yy": ("epsilon_v", -1.0),
+}
+
+# What histories hold besides the components of the fields.
+HISTORIES: dict[str, Quantity] = {
+    **{
+        f"{name}_{axis}": Quantity(FIELDS[name].unit, f"{axis} component")
+        for name in ("acceleration", "velocity", "displacement")
+        for axis in "xy"
+    },
+    **{name: FIELDS[name] for name in (*WATER_FIELDS, "r_u_stress", "sigma_v_eff", "sigma_h_eff", "tau_xy")},
+    "epsilon_h": Quantity("1", "horizontal strain since the stage began, shortening positive"),
+    "epsilon_v": Quantity("1", "vertical strain since the stage began, shortening positive"),
+    "gamma_xy": FIELDS["gamma_xy"],
+}
+
+# Histories that are kept only if `output.stress_paths` is set.
+STRESS_HISTORIES = (
+    "r_u_stress",
+    "sigma_v_eff",
+    "sigma_h_eff",
+    "tau_xy",
+    "epsilon_h",
+    "epsilon_v",
+    "gamma_xy",
+)
+
+
+def unknown_name(path: str, name: str, known: list[str]) -> InvalidInput:
+    """The refusal of a name that is none of `known`, with the nearest right one."""
+    meant = nearest_name(name, known)
+    return InvalidInput(
+        path, name, f"must be one of {', '.join(known)}", f"did you mean {meant!r}?" if meant else None
+    )
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A point where histories are taken: its initial place (m) and how the scene speaks of it."""
+
+    label: str
+    x: float
+    y: float
+
+
+def probes_of(scene: Scene, particles: Discretisation) -> list[Probe]:
+    """Where the histories of a scene are taken: surface, base and depths in the mid column, then points."""
+    x0, y0, x1, _ = scene.bounds
+    x = 0.5 * (x0 + x1)
+    surface = float(particles.overburden.surface_elevation(np.array([x]))[0])
+    column = [("surface", surface), ("base", y0)]
+    column += [(f"depth {depth:g} m", surface - depth) for depth in scene.output.depths]
+    points = [(f"point ({px:g}, {py:g}) m", px, py) for px, py in scene.output.points]
+    return [*(Probe(label, x, y) for label, y in column), *(Probe(*point) for point in points)]
+
+
+class Simulation:
+    """A scene under way, from its geostatic stress through its stages.
+
+    Arrays are copies, one row per node in the order of :func:`discretise` (row by row from the bottom).
+
+    Parameters
+    ----------
+    scene : what is computed
+    threads : that share the work; results are the same bits for any number
+
+    Attributes
+    ----------
+    scene : as given
+    particles : the nodes and their geostatic state
+    probes : where histories are taken
+    motions : the motion of every stage, None where there is none
+
+    Raises
+    ------
+    InvalidInput : a motion that cannot be read or used, a spacing that leaves a region empty, threads below 1
+    SimulationDiverged : from the stepping methods, when a field is no longer finite; fields stay readable
+    """
+
+    def __init__(self, scene: Scene, threads: int = 2) -> None:
+        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+            raise InvalidInput("threads", threads, "must be a whole number, at least 1")
+        self.scene = scene
+        self.particles = discretise(scene)
+        self.probes = probes_of(scene, self.particles)
+        self.motions = [_motion(stage) for stage in scene.stages]
+        waves = [None if motion is None else motion.upgoing_velocity() for motion in self.motions]
+        self._waves = [None if wave is None else (wave[0], np.ascontiguousarray(wave[1])) for wave in waves]
+        self._durations = [
+            stage.resolved_duration if isinstance(stage, Shaking) else None for stage in scene.stages
+        ]
+        self._core = _core.Simulation(_description(scene, self.particles), threads)
+        self._index = -1
+        self._begin_next_stage()
+
+    # Driving
+
+    @property
+    def stage(self) -> str:
+        """Name of the present stage, as in `scene.stage_names`."""
+        return self.scene.stage_names[self._index]
+
+    @property
+    def time(self) -> float:
+        """Time since the present stage began, s. In the gravity stage it only counts the way to rest."""
+        return self._core.time
+
+    @property
+    def dt(self) -> float:
+        """Present time step, s."""
+        return self._core.time_step[0]
+
+    @property
+    def dt_limit(self) -> str:
+        """What limits the time step."""
+        return self._core.time_step[1]
+
+    @property
+    def steps(self) -> int:
+        """Steps made in the present stage."""
+        return self._core.step
+
+    @property
+    def duration(self) -> float | None:
+        """Duration of the present stage, s; None for gravity, which ends when the ground is at rest."""
+        return self._durations[self._index]
+
+    @property
+    def stage_is_complete(self) -> bool:
+        """Whether the present stage has reached its end."""
+        return self._core.is_complete
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the last stage has reached its end."""
+        return self.stage_is_complete and self._index == len(self.scene.stages) - 1
+
+    def step(self, count: int = 1) -> int:
+        """Make `count` steps, going on to the next stage where one ends; returns how many were made."""
+        made = 0
+        while made < count and self._under_way():
+            before = self._core.step
+            self._core.advance(steps=count - made, until=math.inf, seconds=LOOK_INTERVAL)
+            made += self._core.step - before
+        return made
+
+    def run_stage(self) -> None:
+        """Run the present stage to its end, or the next one if the present one is at its end."""
+        if self._under_way():
+            while not self.advance(math.inf, LOOK_INTERVAL):
+                pass
+
+    def advance(self, until: float, seconds: float) -> bool:
+        """Run the present stage until its time is `until` (s) or `seconds` of wall time have passed.
+
+        Returns whether `until` or the end of the stage is reached, to half a time step: the time step is
+        never changed to meet it.
+        """
+        done = self._core.advance(steps=_NO_LIMIT, until=until, seconds=seconds)
+        return done or self._core.time + 0.5 * self.dt >= until
+
+    def begin_next_stage(self) -> None:
+        """Leave the present stage as it stands and begin the next one."""
+        if self._index + 1 == len(self.scene.stages):
+            raise SandboilError(f"{self.stage!r} is the last stage")
+        self._begin_next_stage()
+
+    def _under_way(self) -> bool:
+        """Whether there is a step to make, after going on to the next stage where one has ended."""
+        if self.stage_is_complete and not self.is_complete:
+            self._begin_next_stage()
+        return not self.stage_is_complete
+
+    def _begin_next_stage(self) -> None:
+        self._index += 1
+        stage = self.scene.stages[self._index]
+        if isinstance(stage, Gravity):
+            self._core.begin_gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
+            return
+        scene, output = self.scene, self.scene.output
+        base = stage.base
+        self._core.begin_shaking(
+            {
+                "duration": self.duration,
+                "wave": self._waves[self._index],
+                "half_space": None if base.Vs is None else (base.Vs, base.density),
+                "local_damping": scene.numerics.local_damping,
+                "time_step_factor": scene.numerics.time_step_factor,
+                "probes": np.array([(probe.x, probe.y) for probe in self.probes]),
+                "history_interval": output.history_dt,
+                "stress_histories": output.stress_paths,
+                "pressure_envelope": "r_u" in output.envelopes,
+                "strain_envelope": "gamma_max" in output.envelopes,
+            }
+        )
+
+    # Reading
+
+    @property
+    def field_names(self) -> list[str]:
+        """Names that :meth:`field` knows in this scene."""
+        return [name for name in FIELDS if self.scene.water is not None or name not in WATER_FIELDS]
+
+    def field(self, name: str) -> Floats:
+        """A field at the nodes: (n, 2) for displacement, velocity and acceleration, else (n,).
+
+        Stresses (kPa) are effective and compression positive, means over a node's stress nodes; strains count
+        from the beginning of the stage. Pore pressures exist only with water. See `FIELDS` for units.
+        Raises :class:`InvalidInput` for an unknown name.
+        """
+        if name not in self.field_names:
+            raise unknown_name("field", name, self.field_names)
+        return self.fields([name])[name]
+
+    def fields(self, names: list[str]) -> dict[str, Floats]:
+        """Several fields of the same instant; see :meth:`field`."""
+        core, particles = self._core, self.particles
+        excess = core.excess_pore_pressure()
+        stress, strain = core.stress(), core.strain()
+        sigma_h, sigma_v, tau, sigma_z = (stress.mean(axis=1) * (-1.0, -1.0, 1.0, -1.0)).T
+        values: dict[str, Floats] = {
+            "displacement": core.displacement(),
+            "velocity": core.velocity(),
+            "acceleration": core.acceleration(),
+            "r_u_stress": 1.0 - pore_pressure_ratio(sigma_v, particles.sigma_v_eff0),
+            "sigma_v_eff": sigma_v,
+            "sigma_h_eff": sigma_h,
+            "p_eff": (sigma_v + sigma_h + sigma_z) / 3.0,
+            "tau_xy": tau,
+            "gamma_xy": strain[:, :, 2].mean(axis=1),
+            "gamma_max": np.hypot(strain[:, :, 0] - strain[:, :, 1], strain[:, :, 2]).max(axis=1),
+        }
+        if excess is not None:
+            values["excess_pore_pressure"] = excess
+            values["pore_pressure"] = particles.pore_pressure0 + excess
+            values["r_u"] = pore_pressure_ratio(excess, particles.sigma_v_eff0)
+        return {name: np.ascontiguousarray(values[name]) for name in names}
+
+    def envelope(self, name: str) -> Floats | None:
+        """Largest "r_u" or "gamma_max" of all steps of the stage so far, (n,); None where it is not kept.
+
+        Raises :class:`InvalidInput` for another name.
+        """
+        if name not in ENVELOPES:
+            raise unknown_name("envelope", name, list(ENVELOPES))
+        if name == "gamma_max":
+            return self._core.largest_shear_strain()
+        excess = self._core.largest_excess_pore_pressure()
+        return None if excess is None else pore_pressure_ratio(excess, self.particles.sigma_v_eff0)
+
+    def take_histories(self) -> tuple[Floats, dict[str, Floats]]:
+        """History samples finished since the last call: times (m,) in s, and (m, probes) by name.
+
+        They have gone through a low-pass filter before thinning. Empty outside a shaking stage.
+        """
+        time, values = self._core.take_histories()
+        histories = {}
+        for k, channel in enumerate(self._core.channel_names()):
+            name, factor = _CHANNELS.get(channel, (channel, 1.0))
+            histories[name] = factor * values[:, :, k] if len(time) else np.empty((0, len(self.probes)))
+        return time, histories
+
+    # Accounting
+
+    @property
+    def residual(self) -> float:
+        """Largest unbalanced acceleration over gravity in the gravity stage; infinite before a step."""
+        return self._core.residual
+
+    @property
+    def base_impedance(self) -> float | None:
+        """Mean dashpot coefficient rho Cs of the base, kPa s/m; None without a compliant base."""
+        impedance = self._core.base_impedance
+        return float(np.mean(impedance)) if impedance else None
+
+    @property
+    def flow_scheme(self) -> str:
+        """How pore pressure is advanced in the stage: "none", "undrained", "explicit", "implicit", ..."""
+        return self._core.flow_scheme
+
+    @property
+    def stress_nodes(self) -> int:
+        """Number of stress nodes."""
+        return int(np.prod(self._core.stress().shape[:2]))
+
+    @property
+    def pairs(self) -> int:
+        """Pairs of stress and velocity nodes."""
+        return self._core.pairs
+
+    def arrays(self) -> dict[str, int]:
+        """Bytes of the core's arrays by name; what the scene does not ask for is not there."""
+        return dict(self._core.arrays())
+
+    def counters(self) -> dict[str, int]:
+        """Work done since the scene was made, by kind."""
+        return self._core.counters()
+
+
+def pore_pressure_ratio(pressure: Floats, sigma_v_eff0: Floats) -> Floats:
+    """Pressure over the geostatic vertical effective stress; nan where that is not positive (the surface)."""
+    positive = sigma_v_eff0 > 0.0
+    ratio: Floats = np.where(positive, pressure / np.where(positive, sigma_v_eff0, 1.0), np.nan)
+    return ratio
+
+
+def _motion(stage: Gravity | Shaking) -> Motion | None:
+    return stage.motion.load() if isinstance(stage, Shaking) and stage.motion is not None else None
+
+
+def stress_node_positions(particles: Discretisation) -> Floats:
+    """Initial places of the stress nodes, m, (n, 2, 2): node, first or second, (x, y)."""
+    offset = np.array(_core.stress_node_offset(*particles.spacing))
+    places: Floats = particles.position[:, None, :] + offset * np.array([[[1.0], [-1.0]]])
+    return places
+
+
+def _description(scene: Scene, particles: Discretisation) -> dict[str, Any]:
+    """The scene as the numerical core takes it."""
+    x0, x1, y0, _ = particles.bounds
+    sigma_v_eff, _ = particles.stress_at(stress_node_positions(particles).reshape(-1, 2))
+    water = scene.water
+    numerics = scene.numerics.model_dump(exclude={"local_damping", "time_step_factor"})
+    return {
+        "spacing": particles.spacing,
+        "position": particles.position,
+        "region": particles.region.astype(np.uint32),
+        "regions": [_region(scene, region) for region in scene.regions],
+        "surface_elevation": particles.surface_elevation,
+        "vertical_effective_stress": sigma_v_eff,
+        "pore_pressure": np.empty(0) if water is None else particles.pore_pressure0,
+        "water": None if water is None else (water.unit_weight, water.bulk_modulus),
+        "gravity": scene.gravity,
+        "period": x1 - x0,
+        "base_elevation": y0,
+        "numerics": numerics,
+    }
+
+
+def _region(scene: Scene, region: Region) -> dict[str, Any]:
+    soil = region.resolved(scene)
+    open_porosity = soil.porosity == 0.0
+    porosity = _NOMINAL_POROSITY if open_porosity else soil.porosity
+    gravity = next(stage for stage in scene.stages if isinstance(stage, Gravity))
+    poisson = gravity.initial_poisson_ratio
+    return {
+        "material": material_description(region),
+        "porosity": porosity,
+        "solid_density": soil.dry_density / (1.0 - porosity),
+        "hydraulic_conductivity": region.hydraulic_conductivity or 0.0,
+        "earth_pressure_coefficient": region.K0,
+        "static_poisson_ratio": region.initial_poisson_ratio if poisson is None else poisson,
+    }
+
+
+def material_description(region: Region) -> dict[str, Any]:
+    """The soil of a region as the numerical core takes it."""
+    return {"kind": region.material.kind, **region.material.core()}
