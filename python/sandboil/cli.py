@@ -12,7 +12,7 @@ import typer
 from ._errors import InvalidInput, RunInterrupted, SandboilError
 from .motion import Kind, Motion
 from .plan import plan as plan_of
-from .results import FILE_NAME
+from .results import FILE_NAME, load
 from .run import Accuracy
 from .run import run as run_scene
 from .scene import Scene
@@ -86,6 +86,82 @@ def run(
         error.add_note(f"results until then: {out / FILE_NAME}")
         raise
     typer.echo(str(results.summary()))
+
+
+@app.command()
+def plot(
+    folder: Annotated[Path, typer.Argument(help="Folder of a run.", metavar="DIR")],
+    reference: Annotated[
+        Path | None, typer.Option(help="Folder with another code's results in CSV, to lay over.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the pictures, default plots in DIR.")] = None,
+    stage: Annotated[str | None, typer.Option(help="A shaking stage, default the last.")] = None,
+) -> None:
+    """Draw the surface's motion, pore pressure, the column and stress paths of a run as PNG."""
+    # Drawing takes a second to load and no other command draws.
+    from .plots import Reference
+    from .plots import plot as draw
+
+    laid_over = None if reference is None else Reference.read(reference)
+    for path in draw(load(folder), out, reference=laid_over, stage=stage):
+        typer.echo(str(path))
+
+
+@motion_app.command()
+def info(
+    file: MotionFile, unit: UnitOption = None, column: ColumnOption = None, kind: KindOption = "outcrop"
+) -> None:
+    """Print the measures of a motion."""
+    motion = Motion.from_file(file, unit=unit, column=column, kind=kind)
+    for name, value, symbol in (
+        ("kind", motion.kind, ""),
+        ("points", len(motion.time), ""),
+        ("time step", motion.dt, " s"),
+        ("duration", motion.duration, " s"),
+        ("peak acceleration", motion.pga_g, " g"),
+        ("peak velocity", motion.pgv, " m/s"),
+        ("peak displacement", float(abs(motion.displacement).max()), " m"),
+        ("Arias intensity", motion.arias, " m/s"),
+        ("CAV", motion.cav, " m/s"),
+        ("significant duration 5-95 %", motion.d5_95, " s"),
+    ):
+        typer.echo(f"{name:<28}{value:.4g}{symbol}" if isinstance(value, float) else f"{name:<28}{value}")
+
+
+@motion_app.command()
+def spectrum(
+    file: MotionFile,
+    unit: UnitOption = None,
+    column: ColumnOption = None,
+    damping: Annotated[float, typer.Option(help="Fraction of critical.")] = 0.05,
+) -> None:
+    """Print the pseudo-acceleration response spectrum as CSV."""
+    response = Motion.from_file(file, unit=unit, column=column).response_spectrum(damping)
+    typer.echo("period_s,psa_g")
+    for period, psa in zip(response.periods, response.psa_g, strict=True):
+        typer.echo(f"{period:.6g},{psa:.6g}")
+
+
+@motion_app.command()
+def convert(
+    file: MotionFile,
+    out: Annotated[Path, typer.Option(help="File to write, .AT2 or .csv.")],
+    unit: UnitOption = None,
+    column: ColumnOption = None,
+    pga: Annotated[float | None, typer.Option(help="Scale to this peak acceleration, g.")] = None,
+    low: Annotated[float | None, typer.Option(help="Take frequencies below this away, Hz.")] = None,
+    high: Annotated[float | None, typer.Option(help="Take frequencies above this away, Hz.")] = None,
+) -> None:
+    """Write a motion in another form, filtered and scaled if asked."""
+    motion = Motion.from_file(file, unit=unit, column=column)
+    if low is not None or high is not None:
+        motion = motion.filtered(low=low, high=high)
+    if pga is not None:
+        motion = motion.scaled(pga_g=pga)
+    writers = {".at2": motion.write_at2, ".csv": motion.write_csv}
+    if out.suffix.lower() not in writers:
+        raise InvalidInput("--out", str(out), "must end in .AT2 or .csv: the ending chooses the form")
+    writers[out.suffix.lower()](out)
 
 
 def main() -> None:

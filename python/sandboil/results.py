@@ -530,7 +530,7 @@ class Run:
         See :func:`sandboil.response_spectrum` for `damping` (fraction) and `periods` (s).
         """
         history = self.history("acceleration_x", at=at, depth=depth, stage=stage, unit="g")
-        return response_spectrum(history.values, _interval(history), periods, damping)
+        return response_spectrum(history.values, interval_of(history), periods, damping)
 
     # Fields
 
@@ -555,7 +555,7 @@ class Run:
         """
         if name not in self.field_names:
             raise unknown_name("field", name, self.field_names)
-        (values,) = self._fields(name, [self._frame(time, self._stage(stage))])
+        values: Floats = self._fields(name, [self._frame(time, self._stage(stage))])[0]
         return values
 
     def field_series(self, name: str, *, stage: str | None = None) -> Floats:
@@ -593,7 +593,7 @@ class Run:
     ) -> Profile:
         """A field over depth in the column of nodes nearest to `x` (m), default the middle of the section."""
         values = self.field(name, time, stage=stage)
-        column = self._column(x)
+        column = self.column(x)
         return Profile(
             name=name,
             unit=FIELDS[name].unit,
@@ -603,8 +603,8 @@ class Run:
             values=values[column],
         )
 
-    def _column(self, x: float | None) -> npt.NDArray[np.intp]:
-        """Nodes of the column nearest to x, from the surface down."""
+    def column(self, x: float | None = None) -> npt.NDArray[np.intp]:
+        """Nodes of the column nearest to `x` (m, default the middle of the section), surface first."""
         x0, _, x1, _ = self.scene.bounds
         wanted = 0.5 * (x0 + x1) if x is None else x
         if not x0 <= wanted <= x1:
@@ -640,7 +640,7 @@ class Run:
 
         Of the uppermost node in the column nearest to `x` (m), default the middle of the section.
         """
-        top = self._column(x)[0]
+        top = self.column(x)[0]
         fall = -self.field_series("displacement", stage=stage)[:, top, 1]
         label = f"surface at x = {self.position[top, 0]:g} m"
         return History("settlement", "m", label, self.frame_times(stage), fall - fall[0])
@@ -697,7 +697,7 @@ def load(folder: str | os.PathLike[str]) -> Run:
     return Run(folder)
 
 
-def _interval(history: History) -> float:
+def interval_of(history: History) -> float:
     """Spacing of a history, s."""
     if len(history.time) < 2:
         raise InvalidInput("history", history.name, "must hold at least two samples: the run ended too early")
@@ -767,7 +767,7 @@ def _stage_figures(run: Run, stage: str) -> dict[str, Any]:
 
 def _response_figures(run: Run, stage: str) -> dict[str, Any]:
     surface = run.history("acceleration_x", stage=stage, unit="g")
-    dt = _interval(surface)
+    dt = interval_of(surface)
     figures: dict[str, Any] = {"peak surface acceleration, g": float(np.abs(surface.values).max())}
     if 0.5 / dt > PGA_CORNER:
         smooth = butterworth(surface.values, dt, None, PGA_CORNER, PGA_ORDER)

@@ -1,0 +1,313 @@
+"""Pictures of a run: what happened at the surface, to the water, over depth, and in the soil.
+
+Every function gives a matplotlib figure; :func:`plot` writes them all. Another code's results in CSV may be
+laid over them; the columns are told in :class:`Reference`.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ._errors import InvalidInput
+from .discretise import Floats
+from .motion import Motion
+from .motion._motion import SIGNIFICANT
+from .motion._series import butterworth
+from .results import PGA_CORNER, PGA_ORDER, Run, interval_of
+from .scene import Shaking
+
+FOLDER = "plots"
+
+# Colours that the colour-blind tell apart (Okabe and Ito 2008): ours, the input's, and the reference's.
+_OURS, _INPUT, _REFERENCE = "#0072B2", "#999999", "#D55E00"
+_COLUMN_TIMES = 6
+# Width of the sway over the height of the column in its picture, before the factor is rounded.
+_SWAY_SHARE = 0.6
+_DPI = 150
+_STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "lines.linewidth": 1.0,
+}
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Results of another code, to be laid over a run's, from a folder of CSV files with a header each.
+
+    ``histories.csv``: time_s, acc_surface_g, and ru_<depth>m for any depths (4 m: ru_4m).
+    ``spectrum.csv``: period_s and psa_surface_g_5pct.
+    ``stress_strain.csv``: time_s, and tau_kPa_<depth>m, sv_eff_kPa_<depth>m, gamma_<depth>m.
+    Compression positive, time 0 at the start of the record. Columns beyond these are passed over.
+    """
+
+    histories: dict[str, Floats]
+    spectrum: dict[str, Floats]
+    stress_strain: dict[str, Floats]
+
+    @classmethod
+    def read(cls, folder: str | os.PathLike[str]) -> Reference:
+        """The files of a folder; :class:`InvalidInput` names the one that is missing or no such table."""
+        return cls(
+            **{
+                name: _table(Path(folder) / f"{name}.csv")
+                for name in ("histories", "spectrum", "stress_strain")
+            }
+        )
+
+
+def _table(path: Path) -> dict[str, Floats]:
+    try:
+        with path.open(encoding="utf-8") as file:
+            names = file.readline().strip().split(",")
+            values = np.loadtxt(file, delimiter=",", ndmin=2)
+    except (OSError, ValueError) as error:
+        raise InvalidInput(
+            "reference", str(path), f"must be a CSV of numbers below a header: {error}"
+        ) from error
+    if values.shape[1] != len(names):
+        raise InvalidInput("reference", str(path), f"must have {len(names)} columns as its header has")
+    return dict(zip(names, values.T, strict=True))
+
+
+def plot(
+    run: Run,
+    folder: str | os.PathLike[str] | None = None,
+    *,
+    reference: Reference | None = None,
+    stage: str | None = None,
+) -> list[Path]:
+    """Write every picture that the run has data for as PNG, and return the paths.
+
+    Parameters
+    ----------
+    folder : where to; default `plots` in the run's own
+    reference : results of another code to lay over
+    stage : a shaking stage, default the last
+
+    Raises
+    ------
+    InvalidInput : a run without shaking, a folder that cannot be written
+    """
+    stage = _shaken_stage(run, stage)
+    with mpl.rc_context(_STYLE):
+        figures = {"surface": surface(run, reference=reference, stage=stage)}
+        if run.scene.water is not None and run.scene.output.depths:
+            figures["pore_pressure"] = pore_pressure(run, reference=reference, stage=stage)
+        figures["column"] = column(run, stage=stage)
+        if run.scene.output.stress_paths and run.scene.output.depths:
+            figures["stress_paths"] = stress_paths(run, reference=reference, stage=stage)
+        target = run.path.parent / FOLDER if folder is None else Path(folder)
+        paths = []
+        try:
+            target.mkdir(parents=True, exist_ok=True)
+            for name, figure in figures.items():
+                paths.append(target / f"{name}.png")
+                figure.savefig(paths[-1], dpi=_DPI)
+        except OSError as error:
+            raise InvalidInput("folder", str(target), f"must be writable: {error}") from error
+    return paths
+
+
+def _shaken_stage(run: Run, stage: str | None) -> str:
+    """The stage asked for, or the last, if it is a shaking one with histories."""
+    shaken = [
+        name
+        for name, kind in zip(run.scene.stage_names, run.scene.stages, strict=True)
+        if isinstance(kind, Shaking) and name in run.stages
+    ]
+    if stage is None and shaken:
+        return shaken[-1]
+    if stage not in shaken:
+        raise InvalidInput(
+            "stage", stage, f"must be a shaking stage of the run: {', '.join(shaken) or 'none'}"
+        )
+    return stage
+
+
+def surface(run: Run, *, reference: Reference | None = None, stage: str | None = None) -> Figure:
+    """Horizontal acceleration of the surface, and its 5 % response spectrum beside the input's."""
+    stage = _shaken_stage(run, stage)
+    history = run.history("acceleration_x", stage=stage, unit="g")
+    motion = run.motion(stage)
+    figure = Figure(figsize=(11.0, 4.5), layout="constrained")
+    panels = figure.subplot_mosaic("AC;BC", width_ratios=[1.4, 1.0], height_ratios=[2.0, 1.0])
+    top, bottom, right = panels["A"], panels["B"], panels["C"]
+
+    label = f"surface, peak {np.abs(history.values).max():.3f} g"
+    dt = interval_of(history)
+    if 0.5 / dt > PGA_CORNER:
+        smooth = np.abs(butterworth(history.values, dt, None, PGA_CORNER, PGA_ORDER)).max()
+        label += f" (below {PGA_CORNER:g} Hz: {smooth:.3f} g)"
+    top.plot(history.time, history.values, color=_OURS, label=label)
+    if reference is not None:
+        values = _column_of(reference.histories, "acc_surface_g")
+        label = f"reference, peak {np.abs(values).max():.3f} g"
+        top.plot(_column_of(reference.histories, "time_s"), values, color=_REFERENCE, lw=0.6, label=label)
+    top.set(ylabel="horizontal acceleration, g", xlim=(0.0, history.time[-1]))
+    top.legend(loc="upper right")
+    if motion is not None:
+        label = f"{motion.kind} motion, peak {motion.pga_g:.3f} g"
+        bottom.plot(motion.time, motion.acceleration_g, color=_INPUT, lw=0.7, label=label)
+        bottom.legend(loc="upper right")
+    bottom.set(xlabel="time, s", ylabel="acceleration, g", xlim=(0.0, history.time[-1]))
+
+    spectrum = run.spectrum(stage=stage)
+    right.semilogx(spectrum.periods, spectrum.psa_g, color=_OURS, label="surface", zorder=3)
+    if motion is not None:
+        shaken = motion.response_spectrum()
+        right.semilogx(shaken.periods, shaken.psa_g, color=_INPUT, label=f"{motion.kind} motion")
+    if reference is not None:
+        periods = _column_of(reference.spectrum, "period_s")
+        values = _column_of(reference.spectrum, "psa_surface_g_5pct")
+        right.semilogx(periods, values, color=_REFERENCE, ls="--", label="reference, surface")
+    right.set(
+        xlabel="period, s",
+        ylabel=f"pseudo-acceleration, {100 * spectrum.damping:g} % damping, g",
+        xlim=(spectrum.periods[0], spectrum.periods[-1]),
+        ylim=(0.0, None),
+    )
+    right.xaxis.set_major_formatter("{x:g}")
+    right.legend(loc="upper right")
+    return figure
+
+
+def pore_pressure(run: Run, *, reference: Reference | None = None, stage: str | None = None) -> Figure:
+    """Excess pore pressure ratio over time at the output depths, one panel each."""
+    stage = _shaken_stage(run, stage)
+    depths = run.scene.output.depths
+    figure = Figure(figsize=(8.0, 1.0 + 1.7 * len(depths)), layout="constrained")
+    panels = figure.subplots(len(depths), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, depth in zip(panels, depths, strict=True):
+        history = run.history("r_u", depth=depth, stage=stage)
+        axes.plot(history.time, history.values, color=_OURS, label="sandboil", zorder=3)
+        name = f"ru_{depth:g}m"
+        if reference is not None and name in reference.histories:
+            time = _column_of(reference.histories, "time_s")
+            axes.plot(time, reference.histories[name], color=_REFERENCE, label="reference")
+        axes.axhline(1.0, color="black", lw=0.6, ls=":")
+        axes.set(ylabel="$r_u$", ylim=(min(0.0, history.values.min()), max(1.1, history.values.max())))
+        axes.set_title(f"{depth:g} m below the surface", loc="left", fontsize=9)
+    panels[0].legend(loc="upper right", bbox_to_anchor=(1.0, 0.92))
+    panels[-1].set(xlabel="time, s", xlim=(0.0, history.time[-1]))
+    figure.suptitle("Excess pore pressure over initial vertical effective stress", fontsize=10)
+    return figure
+
+
+def column(run: Run, *, stage: str | None = None) -> Figure:
+    """r_u over depth and time in the mid column (with water), and the column's sway at several times."""
+    stage = _shaken_stage(run, stage)
+    times = run.frame_times(stage)
+    wet = run.scene.water is not None
+    figure = Figure(figsize=(9.5 if wet else 4.5, 5.2), layout="constrained")
+    if wet:
+        left, right = figure.subplots(1, 2, width_ratios=[1.7, 1.0])
+        _draw_map(run, stage, times, left)
+    else:
+        right = figure.subplots()
+    _draw_sway(run, stage, times, right)
+    return figure
+
+
+def _draw_map(run: Run, stage: str, times: Floats, axes: Axes) -> None:
+    profile = run.profile("sigma_v_eff", stage=stage)
+    nodes = run.column(profile.x)
+    ratio = run.field_series("r_u", stage=stage)[:, nodes]
+    image = axes.pcolormesh(
+        times, profile.depth, ratio.T, shading="nearest", cmap="viridis", vmin=0.0, vmax=1.0, rasterized=True
+    )
+    axes.figure.colorbar(image, ax=axes, label="$r_u$", extend="max")
+    for below in run.scene.output.depths:
+        axes.axhline(below, color="white", lw=0.6, ls=":")
+    _, bottom, _, top = run.scene.bounds
+    axes.set(xlabel="time, s", ylabel="depth below the surface, m", ylim=(top - bottom, 0.0))
+    axes.set_title(f"excess pore pressure ratio at x = {profile.x:g} m", loc="left", fontsize=9)
+    axes.grid(visible=False)
+
+
+def _draw_sway(run: Run, stage: str, times: Floats, axes: Axes) -> None:
+    """Horizontal displacement against the base, cm, at times spread over strong shaking, and at the end."""
+    nodes = run.column()
+    profile = run.profile("displacement", stage=stage)
+    begin, end = _strong_part(run.motion(stage), times)
+    wanted = [*np.linspace(begin, end, _COLUMN_TIMES), times[-1]]
+    frames = sorted({int(np.argmin(np.abs(times - time))) for time in wanted})
+    displacement = run.field_series("displacement", stage=stage)[:, nodes, 0]
+    sway = 100.0 * (displacement - displacement[:, -1:])[frames]
+    colours = mpl.colormaps["plasma"](np.linspace(0.0, 0.85, len(frames)))
+    for frame, values, colour in zip(frames, sway, colours, strict=True):
+        axes.plot(values, profile.depth, color=colour, label=f"{times[frame]:.1f} s")
+    height = profile.depth[-1] - profile.depth[0]
+    extent = float(np.ptp(sway)) / 100.0
+    if extent > 0.0:
+        factor = _rounded(_SWAY_SHARE * height / extent)
+        # A centimetre of sway takes as much paper as `factor` centimetres of depth.
+        axes.set_aspect(100.0 / factor)
+        axes.set_title(f"sway, drawn {factor:g} times larger", loc="left", fontsize=9)
+    _, bottom, _, top = run.scene.bounds
+    label = "depth below the surface, m"
+    axes.set(xlabel="displacement against the base, cm", ylabel=label, ylim=(top - bottom, 0.0))
+    axes.legend(loc="lower left", fontsize=7, title="time", title_fontsize=7)
+
+
+def _strong_part(motion: Motion | None, times: Floats) -> tuple[float, float]:
+    """Times between which most of the shaking happens, s; without a motion all."""
+    if motion is None or motion.arias == 0.0:
+        return float(times[0]), float(times[-1])
+    share = np.cumsum(motion.acceleration_g**2)
+    begin, end = np.interp(SIGNIFICANT, share / share[-1], motion.time)
+    return float(begin), min(float(end), float(times[-1]))
+
+
+def _rounded(factor: float) -> float:
+    """The largest of 1, 2, 5, 10, 20, ... that does not exceed `factor`; at least 1."""
+    if factor < 1.0:
+        return 1.0
+    decade = 10.0 ** math.floor(math.log10(factor))
+    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= factor)
+
+
+def stress_paths(run: Run, *, reference: Reference | None = None, stage: str | None = None) -> Figure:
+    """Shear stress against vertical effective stress and against shear strain at the output depths."""
+    stage = _shaken_stage(run, stage)
+    depths = run.scene.output.depths
+    figure = Figure(figsize=(9.0, 0.6 + 2.5 * len(depths)), layout="constrained")
+    panels = figure.subplots(len(depths), 2, squeeze=False)
+    for (left, right), depth in zip(panels, depths, strict=True):
+        tau, sigma, gamma = (
+            run.history(name, depth=depth, stage=stage).values
+            for name in ("tau_xy", "sigma_v_eff", "gamma_xy")
+        )
+        if reference is not None and f"tau_kPa_{depth:g}m" in reference.stress_strain:
+            their_tau, their_sigma, their_gamma = (
+                _column_of(reference.stress_strain, f"{name}_{depth:g}m")
+                for name in ("tau_kPa", "sv_eff_kPa", "gamma")
+            )
+            left.plot(their_sigma, their_tau, color=_REFERENCE, lw=0.6, label="reference")
+            right.plot(100.0 * their_gamma, their_tau, color=_REFERENCE, lw=0.6, label="reference")
+        left.plot(sigma, tau, color=_OURS, lw=0.7, label="sandboil")
+        right.plot(100.0 * gamma, tau, color=_OURS, lw=0.7, label="sandboil")
+        left.set(xlabel="vertical effective stress, kPa", ylabel="shear stress, kPa", xlim=(0.0, None))
+        right.set(xlabel="shear strain, %", ylabel="shear stress, kPa")
+        left.set_title(f"{depth:g} m below the surface", loc="left", fontsize=9)
+    panels[0, 1].legend(loc="upper left")
+    return figure
+
+
+def _column_of(table: dict[str, Floats], name: str) -> Floats:
+    if name not in table:
+        raise InvalidInput("reference", ", ".join(table), f"must have a column {name}")
+    return table[name]
