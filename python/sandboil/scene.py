@@ -543,7 +543,7 @@ class Numerics(Model):
 
     operators: Literal["conservative", "printed"] = "conservative"
     smoothing_ratio: Number = Field(default=1.4, ge=1.0, le=3.0, description="h/spacing")
-    velocity_filter: Number = Field(default=0.1, ge=0.0, le=1.0)
+    velocity_filter: Number = Field(default=0.2, ge=0.0, le=1.0)
     local_damping: Number = Field(default=0.0, ge=0.0, lt=1.0)
     time_step_factor: Annotated[Number, Field(gt=0.0, le=2.0)] | None = None
     integrator: Literal["default", "rk4", "reference"] = "default"

@@ -12,6 +12,10 @@ const DRAINED_COEFFICIENT: f64 = 1.0;
 const UNDRAINED_COEFFICIENT: f64 = 1.7;
 /// Explicit diffusion: `dt <= 0.65 dx^2 C / k`.
 const DIFFUSION_COEFFICIENT: f64 = 0.65;
+/// Largest eigenvalue of the velocity filter over `xi C_s / dx`.
+const FILTER_EIGENVALUE: f64 = 1.05;
+/// Largest shear-wave over compression-wave speed of a soil: that of Poisson's ratio zero.
+const LARGEST_SPEED_RATIO: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Wave numbers sampled along an axis and along a diagonal of the lattice.
 const SPECTRUM_SAMPLES: u32 = 24;
 /// Bisections of the implicit limit: one part in a thousand.
@@ -112,6 +116,19 @@ impl PressureSpectrum {
     }
 }
 
+/// What the velocity filter leaves of the limit `dt_0`; the printed set has none.
+///
+/// A leapfrog with damping `c` on the lagging velocity is stable while `(dt/dt_0)^2 + (c dt_0/2) (dt/dt_0) < 1`,
+/// here with the filter's largest eigenvalue on the fastest wave, for which `dt_0 = h / c_d`.
+fn filter_factor(model: &Model) -> f64 {
+    if model.numerics.operators == Operators::Printed {
+        return 1.0;
+    }
+    let damping = FILTER_EIGENVALUE * model.numerics.velocity_filter * LARGEST_SPEED_RATIO;
+    let half = 0.25 * damping * model.numerics.smoothing_ratio;
+    (1.0 + half * half).sqrt() - half
+}
+
 /// Limit for one region at a skeleton stiffness `K + 4G/3` in kPa, s.
 ///
 /// `spectrum` belongs to implicit diffusion and is read only there.
@@ -124,12 +141,8 @@ pub fn region_limit(
 ) -> (f64, Criterion) {
     let h = model.smoothing_length();
     let density = model.mixture_density(region);
-    // The filter's damping narrows the stable range; the printed set carries none.
-    let filter = match model.numerics.operators {
-        Operators::Conservative => 1.0 + model.numerics.velocity_filter,
-        Operators::Printed => 1.0,
-    };
-    let wave = |coefficient: f64, stiffness: f64| coefficient * h / (stiffness / density).sqrt() / filter;
+    let filter = filter_factor(model);
+    let wave = |coefficient: f64, stiffness: f64| coefficient * h / (stiffness / density).sqrt() * filter;
     let drained = (wave(DRAINED_COEFFICIENT, skeleton_stiffness), Criterion::DrainedWave);
     if coupling == PressureCoupling::None {
         return drained;
@@ -149,7 +162,7 @@ pub fn region_limit(
     }
     // Water that drains at grid scale within a step stiffens the short waves no more.
     let stable =
-        |dt: f64| (dt / drained.0).powi(2) + spectrum.share(water / density, diffusivity, dt * filter) <= 1.0;
+        |dt: f64| (dt / drained.0).powi(2) + spectrum.share(water / density, diffusivity, dt / filter) <= 1.0;
     let (mut low, mut high) = (combined.0.min(drained.0), drained.0);
     if !stable(low) {
         return combined;
