@@ -536,7 +536,7 @@ class Numerics(Model):
 
     `smoothing_ratio` is h/spacing; `velocity_filter` and `local_damping` are fractions; `time_step_factor` is
     relative to the measured stability limit; beyond `geometry_strain_limit` the particle lists follow the
-    motion.
+    motion (default 0.2, and 0.02 for the printed operators, which do not carry the deformation).
     """
 
     _label: ClassVar[str] = "numerics"
@@ -550,7 +550,7 @@ class Numerics(Model):
     integrator_tolerance: Annotated[Number, Field(gt=0.0, le=1.0e-4)] | None = None
     diffusion: Literal["auto", "implicit", "explicit"] = "auto"
     acceleration_term: Literal["auto", "on", "off"] = "auto"
-    geometry_strain_limit: Number = Field(default=0.02, ge=0.0)
+    geometry_strain_limit: Positive | None = None
     gap_memory: StrictBool = False
 
 

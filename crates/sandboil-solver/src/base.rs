@@ -30,6 +30,18 @@ impl UpgoingWave {
     }
 }
 
+/// Means over a step of `exp(-z t)` and of what a constant push moves meanwhile, `(1 - exp(-z t)) / z`, with `t` in
+/// steps and `z` the decay of a step: what the dashpot feels of the velocity before and of the step's other forces.
+fn relaxation(z: f64) -> (f64, f64) {
+    // Below, the second mean is lost to cancellation, and its limit is closer than that.
+    const NEGLIGIBLE: f64 = 1e-7;
+    if z < NEGLIGIBLE {
+        return (1.0, 0.5);
+    }
+    let relaxed = -(-z).exp_m1() / z;
+    (relaxed, (1.0 - relaxed) / z)
+}
+
 /// One boundary point below each node of the lowest row.
 #[derive(Debug, Clone)]
 pub struct CompliantBase {
@@ -91,8 +103,9 @@ impl CompliantBase {
 
     /// Adds the base traction of Eq. 14 to velocities that all other forces of the step have moved already.
     ///
-    /// The dashpot takes the mean of the trace before and after the step, so it is second order and never
-    /// limits the time step; the coupling between neighbouring points is lumped, exact for uniform motion.
+    /// The trace relaxes towards twice the upgoing velocity; over a step of constant other forces this is solved
+    /// exactly, so a dashpot of any strength neither limits the time step nor overshoots. The coupling between
+    /// neighbouring points is lumped, exact for uniform motion.
     pub fn end_step(
         &mut self,
         time: f64,
@@ -104,10 +117,11 @@ impl CompliantBase {
         let incoming = 2.0 * self.wave.as_ref().map_or(0.0, |wave| wave.at(time));
         for point in 0..self.impedance.len() {
             let moved: f64 = self.trace.iter_row(point).map(|(node, weight)| weight * velocity[node].x).sum();
-            let mean = 0.5 * (self.trace_before[point] + moved);
+            let before = self.trace_before[point];
+            let (relaxed, pushed) = relaxation(self.rate[point] * dt);
             // The traction is kept in the slot of the old trace until all points have read the velocities.
             self.trace_before[point] =
-                self.impedance[point] * (incoming - mean) / (1.0 + 0.5 * dt * self.rate[point]);
+                self.impedance[point] * (relaxed * (incoming - before) - pushed * (moved - before));
         }
         for point in 0..self.impedance.len() {
             let force = self.trace_before[point] * self.length;
@@ -137,6 +151,19 @@ pub fn base_points(model: &Model, position: &[Vec2]) -> Vec<Vec2> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_dashpot_of_any_strength_relaxes_without_overshoot() {
+        assert_eq!(relaxation(0.0), (1.0, 0.5));
+        for z in [1e-7, 1e-5, 1e-3, 0.1, 1.0, 10.0, 1e6] {
+            let (relaxed, pushed) = relaxation(z);
+            // The decay over the step, and that its integral gives the second mean.
+            assert!((1.0 - z * relaxed - (-z).exp()).abs() < 1e-14 * z.max(1.0), "{z}");
+            let exact: f64 =
+                (0..1000).map(|k| -(-z * (f64::from(k) + 0.5) / 1000.0).exp_m1() / z / 1000.0).sum();
+            assert!((pushed - exact).abs() < 1e-4 * exact.max(1e-3), "{z}: {pushed} {exact}");
+        }
+    }
 
     #[test]
     fn the_wave_is_linear_between_samples_and_zero_outside() {

@@ -3,7 +3,14 @@
 //! The unknown is the excess over the pressure at the start of the stage, in kPa: its reference is carried by
 //! the constant nodal forces, and only the increments meet the transposed operators.
 
-use crate::{banded::BandedLu, geometry::FlowTables, model::Model, phases::Phases};
+use crate::{
+    banded::BandedLu,
+    deformation::{Cofactor, Deformation},
+    geometry::FlowTables,
+    model::{Model, STRESS_NODES},
+    phases::Phases,
+    skeleton::StressPoint,
+};
 use sandboil_sph::{Csr, Vec2};
 
 /// A node whose pressure follows from the prescribed value on the free surface (half-cell rule).
@@ -20,6 +27,10 @@ struct SurfaceNode {
 pub struct Flow {
     /// Excess pore pressure at velocity nodes, kPa, compression positive.
     pub excess: Vec<f64>,
+    /// `J F^-T` at velocity nodes: the mean deformation of their stress nodes.
+    cofactor: Vec<Cofactor>,
+    /// `J` at velocity nodes.
+    volume_ratio: Vec<f64>,
     /// `K_f / n`: pressure rise per unit of volume strain, kPa.
     stiffness: Vec<f64>,
     /// Hydraulic conductivity, m/s.
@@ -62,6 +73,8 @@ impl Flow {
             |value: &dyn Fn(usize) -> f64| model.region.iter().map(|&r| value(r as usize)).collect();
         Some(Self {
             excess: vec![0.0; model.nodes()],
+            cofactor: vec![Deformation::default().cofactor(); model.nodes()],
+            volume_ratio: vec![1.0; model.nodes()],
             stiffness: (0..model.nodes()).map(|node| model.water_stiffness(phases.porosity(node))).collect(),
             conductivity: per_node(&|region| model.regions[region].hydraulic_conductivity),
             unit_weight: water.unit_weight,
@@ -82,6 +95,8 @@ impl Flow {
         for (node, stiffness) in self.stiffness.iter_mut().enumerate() {
             *stiffness = model.water_stiffness(phases.porosity(node));
         }
+        self.cofactor.fill(Deformation::default().cofactor());
+        self.volume_ratio.fill(1.0);
         if let Scheme::Implicit { factors } = &mut self.scheme {
             *factors = None;
         }
@@ -103,7 +118,24 @@ impl Flow {
             Scheme::Implicit { factors: Some((_, lu)) } => lu.bytes(),
             _ => 0,
         };
-        4 * size_of_val(self.excess.as_slice()) + factors
+        5 * size_of_val(self.excess.as_slice()) + size_of_val(self.cofactor.as_slice()) + factors
+    }
+
+    /// Follows the deformation of the skeleton since the geometry was built.
+    pub fn deform(&mut self, points: &[StressPoint]) {
+        let own = points.chunks_exact(STRESS_NODES);
+        for ((cofactor, ratio), own) in self.cofactor.iter_mut().zip(&mut self.volume_ratio).zip(own) {
+            let deformation = own[0].deformation.mean(&own[1].deformation);
+            *cofactor = deformation.cofactor();
+            *ratio = deformation.volume_ratio();
+        }
+    }
+
+    /// Force of the excess pressure on node `j`, kN/m: the exact transpose of the divergence.
+    #[inline]
+    pub fn force(&self, tables: &FlowTables, j: usize) -> Vec2 {
+        let row = tables.divergence.transposed.iter_row(j);
+        row.map(|(i, weight)| self.cofactor[i].carry(*weight) * self.excess[i]).sum()
     }
 
     /// Advances the excess pressure by one step from the velocity field at its middle (Eq. 7).
@@ -113,8 +145,12 @@ impl Flow {
     pub fn step(&mut self, tables: &FlowTables, velocity: &[Vec2], acceleration: &[Vec2], dt: f64) -> bool {
         let divergence = &tables.divergence.forward;
         for node in 0..self.excess.len() {
-            let volume_rate: f64 =
-                divergence.iter_row(node).map(|(j, weight)| weight.dot(&velocity[j])).sum();
+            let (mut x, mut y) = (Vec2::zeros(), Vec2::zeros());
+            for (j, weight) in divergence.iter_row(node) {
+                x += weight * velocity[j].x;
+                y += weight * velocity[j].y;
+            }
+            let volume_rate = self.cofactor[node].contract(x, y) / self.volume_ratio[node];
             // dp = (gamma_f / C) dh-rate with C = n gamma_f / K_f.
             self.right_hand_side[node] = self.excess[node] - dt * self.stiffness[node] * volume_rate;
         }

@@ -6,6 +6,7 @@
 
 mod banded;
 pub mod base;
+mod deformation;
 pub mod error;
 mod flow;
 mod geometry;

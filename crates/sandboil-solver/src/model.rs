@@ -99,10 +99,21 @@ pub struct Numerics {
     pub diffusion: Diffusion,
     /// Acceleration term of Eq. 7.
     pub acceleration_term: AccelerationTerm,
-    /// Strain since the last geometry at which lists and weights are rebuilt.
-    pub geometry_strain_limit: f64,
+    /// Strain since the last geometry at which lists and weights are rebuilt; none: that of the operators.
+    pub geometry_strain_limit: Option<f64>,
     /// Integrator of the sand model.
     pub integrator: sandboil_soil::Integrator,
+}
+
+impl Numerics {
+    /// Strain that the operators bear before lists and weights are rebuilt: the conservative set carries the
+    /// deformation and needs new neighbours only; the printed one errs by the strain itself.
+    pub fn geometry_strain_limit(&self) -> f64 {
+        self.geometry_strain_limit.unwrap_or(match self.operators {
+            Operators::Conservative => 0.2,
+            Operators::Printed => 0.02,
+        })
+    }
 }
 
 /// A complete description of the section.
@@ -206,7 +217,7 @@ impl Model {
         positive("spacing.y", self.spacing.y)?;
         positive("gravity", self.gravity)?;
         positive("smoothing_ratio", self.numerics.smoothing_ratio)?;
-        positive("geometry_strain_limit", self.numerics.geometry_strain_limit)?;
+        positive("geometry_strain_limit", self.numerics.geometry_strain_limit())?;
         if let Some(water) = self.water {
             positive("water.unit_weight", water.unit_weight)?;
             positive("water.bulk_modulus", water.bulk_modulus)?;

@@ -2,6 +2,7 @@
 
 use crate::{
     base::{CompliantBase, UpgoingWave, base_points},
+    deformation::Deformation,
     error::SolverError,
     flow::{Flow, FlowScheme},
     geometry::{Geometry, Wall, consistent_gradient, point_weights, stress_node_positions},
@@ -107,7 +108,6 @@ struct ActiveShaking {
     channel_values: Vec<f64>,
     pressure_envelope: Option<Vec<f64>>,
     strain_envelope: Option<Vec<f64>>,
-    reference_strain: Vec<[f64; 3]>,
 }
 
 /// Result of one chunk of the velocity update.
@@ -228,7 +228,8 @@ impl Simulation {
         }
         (self.dt, self.criterion) = self.limit(PressureCoupling::None, RELAXATION_FACTOR);
         self.begin(Active::Gravity { stage, kinetic_energy: 0.0, residual: f64::INFINITY, at_rest: false });
-        self.refresh_shares();
+        self.velocity.fill(Vec2::zeros());
+        self.refresh_shares(&vec![Vec2::zeros(); self.model.nodes()]);
         Ok(())
     }
 
@@ -284,23 +285,40 @@ impl Simulation {
             pressure_envelope: (stage.pressure_envelope && self.flow.is_some())
                 .then(|| vec![0.0; self.model.nodes()]),
             strain_envelope: stage.strain_envelope.then(|| vec![0.0; self.points.len()]),
-            reference_strain: vec![[0.0; 3]; self.points.len()],
             base,
             coupling,
             probes,
             stage,
         })));
-        self.refresh_shares();
         self.store_reaction();
         Ok(())
     }
 
     /// Makes the present state one of rest: the constant forces balance whatever stress and pressure leave over.
     fn store_reaction(&mut self) {
+        self.constant_force = self.static_force().iter().map(|force| -force).collect();
+    }
+
+    /// Force of stress and pressure alone on every node, kN/m: without the velocity filter.
+    fn static_force(&mut self) -> Vec<Vec2> {
+        self.refresh_shares(&vec![Vec2::zeros(); self.model.nodes()]);
         self.prepare_printed_stress();
-        let reaction: Vec<Vec2> =
-            (0..self.model.nodes()).map(|j| -self.internal_force(j, Vec2::zeros())).collect();
-        self.constant_force = reaction;
+        (0..self.model.nodes()).map(|j| self.internal_force(j, Vec2::zeros())).collect()
+    }
+
+    /// Builds the geometry anew under way. A strained lattice meets other weights than the one it came from; the
+    /// difference they make to the force of the present stresses stays as a constant force, so that the soil is
+    /// not struck by the change: blows of a few hundredths of gravity would liquefy it further.
+    fn renew_geometry(&mut self) {
+        let before = self.static_force();
+        self.rebuild_geometry();
+        let after = self.static_force();
+        for ((constant, before), after) in self.constant_force.iter_mut().zip(before).zip(after) {
+            *constant += before - after;
+        }
+        let velocity = std::mem::take(&mut self.velocity);
+        self.refresh_shares(&velocity);
+        self.velocity = velocity;
     }
 
     /// Gives the section an excess pore pressure (kPa, user's node order) before the first step of shaking, held
@@ -351,7 +369,7 @@ impl Simulation {
         self.counters.geometry_builds += 1;
     }
 
-    /// Volumes, densities and masses of the present strain.
+    /// Volumes, densities and masses of the present strain, from which deformation starts anew.
     fn follow_volumes(&mut self) {
         self.counters.porosity_clips += self.phases.follow(&self.points);
         for (node, mass) in self.mass.iter_mut().enumerate() {
@@ -360,15 +378,16 @@ impl Simulation {
             for point in &mut self.points[STRESS_NODES * node..STRESS_NODES * (node + 1)] {
                 point.density = *mass / volume;
                 point.volume = volume / STRESS_NODES as f64;
+                point.deformation = Deformation::default();
             }
         }
     }
 
-    /// Fills the force loop's shares from the present stress and velocity.
-    fn refresh_shares(&mut self) {
+    /// Fills the force loop's shares from the present stress and a velocity field.
+    fn refresh_shares(&mut self, velocity: &[Vec2]) {
         let filter = self.filter();
         for s in 0..self.points.len() {
-            let motion = motion(&self.geometry, s, &self.velocity);
+            let motion = motion(&self.geometry, s, velocity);
             self.shares[s] = motion.share(&self.points[s], self.geometry.covariance[s], filter);
         }
     }
@@ -472,11 +491,7 @@ impl Simulation {
         };
         if let (Some(flow), Some(tables)) = (&self.flow, &self.geometry.flow) {
             match &self.geometry.printed {
-                None => {
-                    for (i, weight) in tables.divergence.transposed.iter_row(j) {
-                        force += weight * flow.excess[i];
-                    }
-                }
+                None => force += flow.force(tables, j),
                 Some(printed) => {
                     for (i, gradient) in printed.pressure_gradient.iter_row(j) {
                         force -= gradient * (flow.excess[i] * self.phases.volume()[j]);
@@ -536,7 +551,7 @@ impl Simulation {
     }
 
     /// Forces and accelerations, and velocities moved by them over `dt`; positions stay.
-    fn accelerate(&mut self, dt: f64, local_damping: f64) {
+    fn accelerate(&mut self, dt: f64) {
         self.prepare_printed_stress();
         let mut velocity = std::mem::take(&mut self.velocity);
         let mut acceleration = std::mem::take(&mut self.acceleration);
@@ -551,11 +566,7 @@ impl Simulation {
                 let j = first + k;
                 let mass = this.mass[j];
                 // The constant force comes last, so that a state at rest cancels to the last bit.
-                let mut acting = (this.internal_force(j, *v) + this.constant_force[j]) / mass;
-                if local_damping > 0.0 {
-                    // Eq. 16.
-                    acting -= acting.abs().component_mul(&v.map(sign)) * local_damping;
-                }
+                let acting = (this.internal_force(j, *v) + this.constant_force[j]) / mass;
                 *a = acting;
                 *v += acting * dt;
                 let size = acting.norm();
@@ -565,6 +576,17 @@ impl Simulation {
             }
         });
         (self.velocity, self.acceleration, self.sums, self.unit) = (velocity, acceleration, sums, unit);
+    }
+
+    /// Local damping of Eq. 16 on the whole acceleration, the base's tractions included, against the velocity that
+    /// each node had before it.
+    fn damp_locally(&mut self, local_damping: f64, dt: f64) {
+        for (v, a) in self.velocity.iter_mut().zip(&mut self.acceleration) {
+            let before = *v - *a * dt;
+            let drag = a.abs().component_mul(&before.map(sign)) * -local_damping;
+            *v += drag * dt;
+            *a += drag;
+        }
     }
 
     /// Strain, soil model and the shares of the next force loop, from the velocity at mid-step.
@@ -593,7 +615,7 @@ impl Simulation {
         let Active::Gravity { kinetic_energy, .. } = self.active else { return Ok(()) };
         // From rest the first kick of a leapfrog spans half a step; a whole one would let modes near the
         // stability limit flip for ever between two stops.
-        self.accelerate(if kinetic_energy == 0.0 { 0.5 * dt } else { dt }, 0.0);
+        self.accelerate(if kinetic_energy == 0.0 { 0.5 * dt } else { dt });
         // Chunk sums are added in order, whatever thread made them.
         let sum = self.sums.iter().fold(MotionSum::default(), |total, chunk| MotionSum {
             kinetic_energy: total.kinetic_energy + chunk.kinetic_energy,
@@ -642,8 +664,11 @@ impl Simulation {
     fn shaking_step_with(&mut self, shaking: &mut ActiveShaking) -> Result<(), SolverError> {
         let dt = self.dt;
         shaking.base.begin_step(&self.velocity);
-        self.accelerate(dt, shaking.stage.local_damping);
+        self.accelerate(dt);
         shaking.base.end_step(self.time, dt, &self.mass, &mut self.velocity, &mut self.acceleration);
+        if shaking.stage.local_damping > 0.0 {
+            self.damp_locally(shaking.stage.local_damping, dt);
+        }
         self.counters.base_calls += 1;
         self.record(shaking);
         for (x, v) in self.position.iter_mut().zip(&self.velocity) {
@@ -652,6 +677,7 @@ impl Simulation {
         self.update_stress(dt)?;
         if let (Some(flow), Some(tables)) = (&mut self.flow, &self.geometry.flow) {
             self.counters.flow_calls += 1;
+            flow.deform(&self.points);
             if !flow.step(tables, &self.velocity, &self.acceleration, dt) {
                 return Err(self.diverged("pore pressure matrix", 0, f64::NAN));
             }
@@ -681,16 +707,9 @@ impl Simulation {
             (self.dt, self.criterion) = (target, criterion);
             self.counters.time_step_changes += 1;
         }
-        let limit = self.model.numerics.geometry_strain_limit;
-        let outgrown = |(point, reference): (&StressPoint, &[f64; 3])| {
-            point.strain.iter().zip(reference).any(|(now, then)| (now - then).abs() > limit)
-        };
-        if self.points.iter().zip(&shaking.reference_strain).any(outgrown) {
-            for (reference, point) in shaking.reference_strain.iter_mut().zip(&self.points) {
-                *reference = point.strain;
-            }
-            self.rebuild_geometry();
-            self.refresh_shares();
+        let limit = self.model.numerics.geometry_strain_limit();
+        if self.points.iter().any(|point| point.deformation.magnitude() > limit) {
+            self.renew_geometry();
         }
         Ok(())
     }

@@ -146,7 +146,7 @@ impl SoilField {
                         for (k, (point, share)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
                             let s = first_row + first + k;
                             let motion = motion(geometry, s, velocity);
-                            let increment = motion.increment(dt);
+                            let increment = motion.advance(&mut point.deformation, dt);
                             point.stress = elastic.update(&point.stress, &increment);
                             add_strain(point, &increment);
                             *share = motion.share(point, geometry.covariance[s], filter);
@@ -160,7 +160,7 @@ impl SoilField {
                             let (point, state) = (&mut rows.a[k], &mut rows.c[k]);
                             let s = first_row + first + k;
                             let motion = motion(geometry, s, velocity);
-                            let increment = motion.increment(dt);
+                            let increment = motion.advance(&mut point.deformation, dt);
                             match material.update(state, &increment, integrator) {
                                 Ok(report) => outcome.report.merge(&report),
                                 Err(error) => {

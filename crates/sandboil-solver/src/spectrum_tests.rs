@@ -2,6 +2,7 @@
 //! is stable. Lengths in spacings, frequencies in wave speed over spacing.
 
 use crate::{
+    deformation::Deformation,
     geometry::{Geometry, Wall},
     model::{Model, Operators, STRESS_NODES, stress_node_offset},
     phases::Phases,
@@ -150,7 +151,7 @@ fn acceleration_matrix(model: &Model) -> DMatrix<f64> {
         let mut moved = vec![Vec2::zeros(); nodes];
         moved[column / 2][column % 2] = 1.0;
         for (s, point) in points.iter_mut().enumerate() {
-            let strain = motion(&geometry, s, &moved).increment(1.0);
+            let strain = motion(&geometry, s, &moved).increment(&Deformation::default(), 1.0);
             let volume = LAME * (strain.xx + strain.yy);
             point.stress = Stress {
                 xx: volume + 2.0 * SHEAR * strain.xx,

@@ -15,7 +15,7 @@ pub fn numerics() -> Numerics {
         velocity_filter: 0.1,
         diffusion: Diffusion::Auto,
         acceleration_term: AccelerationTerm::Auto,
-        geometry_strain_limit: 0.02,
+        geometry_strain_limit: None,
         integrator: Integrator::default(),
     }
 }

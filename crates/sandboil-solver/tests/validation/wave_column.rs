@@ -122,12 +122,14 @@ fn transfer_function_of_the_matched_column_is_one() {
 
 /// Damping ratio of the column's free vibration on a rigid base, driven gently at its resonance and left alone.
 fn damping_ratio(local_damping: f64) -> f64 {
+    // Resonance must stay within small strains, m/s.
+    const SMALL: f64 = 1e-3;
     let period = 4.0 * HEIGHT / SPEED;
     // A smooth start and end of the drive leave the higher modes at rest: theirs would disturb the sign of v.
     let driven = 8.0 * period;
     let push = |time: f64| {
         let envelope = if time < driven { (PI * time / driven).sin().powi(2) } else { 0.0 };
-        envelope * (2.0 * PI * time / period).sin()
+        SMALL * envelope * (2.0 * PI * time / period).sin()
     };
     let (times, velocity) = surface_velocity(0.4, 1.4, push, driven + 8.0 * period, |stage| {
         stage.half_space = Some((1e6 * SPEED, DENSITY));
@@ -147,8 +149,8 @@ fn damping_ratio(local_damping: f64) -> f64 {
     (amplitude(1.0) / amplitude(1.0 + cycles)).ln() / (2.0 * PI * cycles)
 }
 
-/// Local damping (Eq. 16) of strength `xi` is a damping ratio `xi / pi` at any frequency, beside the 0.13 % that
-/// the nearly rigid base lets out.
+/// Local damping (Eq. 16) of strength `xi` is a damping ratio `xi / pi` at any frequency, beside the
+/// trace that the nearly rigid base lets out.
 #[test]
 fn local_damping_is_a_ratio_of_xi_over_pi() {
     const XI: f64 = 0.05;
@@ -159,6 +161,6 @@ fn local_damping_is_a_ratio_of_xi_over_pi() {
         100.0 * with,
         100.0 * XI / PI
     );
-    assert!(without < 2e-3, "{without}");
+    assert!(without < 2e-4, "{without}");
     assert!(((with - without) * PI / XI - 1.0).abs() < 0.05, "{with}");
 }
