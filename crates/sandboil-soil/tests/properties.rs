@@ -75,7 +75,7 @@ fn integrator() -> impl Strategy<Value = Integrator> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(96) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(256) })]
 
     #[test]
     fn stays_admissible_and_finite(

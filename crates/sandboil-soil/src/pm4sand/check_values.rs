@@ -229,3 +229,32 @@ fn evaluation_near_the_pressure_floor() {
     }
     .check();
 }
+
+/// Between the rotated and the unrotated dilatancy surface a point may dilate, but fabric grows only beyond the
+/// latter.
+#[test]
+fn fabric_waits_for_the_unrotated_surface() {
+    let sand = sand(0.55, 677.0, 0.40);
+    let mut state = start(&sand);
+    let n = traceless(0.1, 0.7);
+    (state.fabric, state.fabric_in) = (traceless(-0.6, -2.2), traceless(-0.3, -1.8));
+    (state.fabric_cumulative, state.fabric_peak, state.p_zp) = (14.0, 4.5, 50.0);
+    let surfaces = sand.surfaces(20.0, sand.void_ratio(&state));
+    let image = (surfaces.dilatancy - 0.01) / std::f64::consts::SQRT_2;
+    let at = |inside: f64| {
+        let alpha = n * (image - inside);
+        let s = (alpha + n * (0.01 / std::f64::consts::SQRT_2)) * 20.0;
+        Point { p: 20.0, s, out_of_plane: 20.0, alpha, fabric: state.fabric }
+    };
+    let memory = Memory::of(&sand, &state);
+    let step = Strain { volume: 0.0, deviator: n * 1e-6 };
+    let reading = Reading { held_moduli: None, clamp: true };
+    for (inside, grows) in [(0.01, false), (-0.01, true)] {
+        let point = at(inside);
+        let flow = sand.flow(n, &point, &memory, surfaces, 1.0e4, true);
+        assert!(flow.dilatancy < 0.0, "D = {} at {inside}", flow.dilatancy);
+        let mut bounding = f64::NAN;
+        let change = sand.change(&point, &memory, sand.void_ratio(&state), step, reading, &mut bounding);
+        assert_eq!(change.unwrap().fabric != Deviator::ZERO, grows, "{inside}");
+    }
+}

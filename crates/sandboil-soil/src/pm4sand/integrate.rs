@@ -138,11 +138,13 @@ impl PM4Sand {
     /// End of a part (Chen and Arduino 2021): moduli, cap at the bounding surface, cumulative fabric.
     fn commit(&self, state: &mut State, fabric_before: Deviator) {
         state.moduli = self.committed_moduli(state);
-        let ratio = stress_ratio(state.mean.max(state.p_min), state.deviator);
+        let p = state.mean.max(state.p_min);
+        let ratio = stress_ratio(p, state.deviator);
         if ratio > state.bounding_ratio {
-            let bounding = state.bounding_ratio;
-            state.deviator = state.deviator * (bounding / ratio);
-            state.alpha = state.deviator * ((bounding - self.constants.m) / (bounding * state.mean));
+            state.deviator = state.deviator * (state.bounding_ratio / ratio);
+            // Below `p_min` the stress keeps a larger ratio than the formulas see; the yield surface has to reach it.
+            let kept = state.bounding_ratio * (p / state.mean);
+            state.alpha = state.deviator * ((kept - self.constants.m) / (kept * state.mean));
         }
         if state.fabric != fabric_before {
             state.fabric_cumulative += FRAC_1_SQRT_2 * (state.fabric - fabric_before).norm();
