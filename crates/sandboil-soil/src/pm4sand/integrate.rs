@@ -197,11 +197,15 @@ impl PM4Sand {
         let strained = state.volumetric_strain + elastic * strain.volume;
         let tolerance = self.yield_tolerance();
 
-        let (mut remaining, mut size, mut may_grow) = (1.0_f64, 1.0_f64, true);
+        // Share of the rest over which the loading direction relaxes: a longer sub-step is refused, or unstable.
+        let (p_min, strained_shear) = (state.p_min, moduli.shear * rest.largest_component());
+        let relaxation = |p: f64| self.constants.m * p.max(p_min) / strained_shear;
+
+        let first = if scheme.reference { 1.0 } else { relaxation(point.p).min(1.0) };
+        let (mut remaining, mut size, mut may_grow) = (1.0_f64, first, true);
         while remaining > 0.0 {
             if let Stages::Four = scheme.stages {
-                let stable = RK4_STABILITY * self.constants.m * point.p.max(state.p_min) / moduli.shear;
-                size = size.min(stable / rest.largest_component()).max(scheme.smallest).min(remaining);
+                size = size.min(RK4_STABILITY * relaxation(point.p)).max(scheme.smallest).min(remaining);
             }
             let step = rest.scaled(size);
             let void_ratio = state.void_ratio_at(strained + (1.0 - remaining) * rest.volume);
@@ -251,7 +255,7 @@ impl PM4Sand {
             };
             report.substeps += 1;
             if end.p < floor {
-                return self.at_floor(&point, state.p_min, report);
+                return self.at_floor(&point, p_min, report);
             }
             let drift = self.yield_function(end.p, end.s, end.alpha);
             if drift > tolerance {
