@@ -307,9 +307,12 @@ class Simulation:
         if name not in ENVELOPES:
             raise unknown_name("envelope", name, list(ENVELOPES))
         if name == "gamma_max":
-            return self._core.largest_shear_strain()
-        excess = self._core.largest_excess_pore_pressure()
-        return None if excess is None else pore_pressure_ratio(excess, self.particles.sigma_v_eff0)
+            largest = self._core.largest_shear_strain()
+        else:
+            excess = self._core.largest_excess_pore_pressure()
+            largest = None if excess is None else pore_pressure_ratio(excess, self.particles.sigma_v_eff0)
+        # The core looks at the beginning of every step: the present state is not among them yet.
+        return None if largest is None else np.maximum(largest, self.field(name))
 
     def take_histories(self) -> tuple[Floats, dict[str, Floats]]:
         """History samples finished since the last call: times (m,) in s, and (m, probes) by name.
