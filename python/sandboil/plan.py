@@ -62,7 +62,7 @@ class Plan:
     physics : (name, active, reason) of all that can be switched off
     stages : cost of each
     arrays : bytes of the core's arrays by name, in the last stage
-    file_size : of the results before compression, bytes
+    file_size : fields and histories in the results before compression, bytes
     pore_pressure_coefficients : Skempton's B of each region, the lowest in it; empty without water
     """
 
@@ -101,7 +101,7 @@ class Plan:
             "              part: a step costs less at rest, and more in liquefied sand.",
             f"memory        {sum(self.arrays.values()) / _BYTES_PER_MB:.3g} MB in "
             f"{', '.join(f'{name} {size / _BYTES_PER_MB:.2g}' for name, size in self.arrays.items())}",
-            f"results file  up to {self.file_size / _BYTES_PER_MB:.3g} MB before compression",
+            f"results file  {self.file_size / _BYTES_PER_MB:.3g} MB before compression",
         ]
         if self.pore_pressure_coefficients:
             lines += ["", "pore pressure coefficient B, the lowest in each region"]

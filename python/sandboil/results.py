@@ -80,6 +80,7 @@ class Writer:
     """Writes a run into a new file as it goes; after every frame the file on disk is complete."""
 
     def __init__(self, path: Path, simulation: Simulation, accuracy: str) -> None:
+        self.path = path
         self._file = h5py.File(path, "x")
         self._simulation = simulation
         self._frames = 0

@@ -1,0 +1,240 @@
+"""The command line as a user meets it: a process, its two streams, its exit code."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scenes
+from sandboil import Gravity, Motion, Run, Shaking, load
+from sandboil.cli import main
+
+DONE, INVALID, STOPPED, INTERRUPTED = 0, 2, 3, 130
+
+
+def command(*arguments: object) -> list[str]:
+    """The installed command, or its module where the scripts' folder is elsewhere."""
+    script = shutil.which("sandboil", path=str(Path(sys.executable).parent))
+    start = [script] if script else [sys.executable, "-c", "from sandboil.cli import main; main()"]
+    return [*start, *map(str, arguments)]
+
+
+def sandboil(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """The command in a process of its own, as a user starts it."""
+    return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=120, check=False)
+
+
+def called(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """The same in this process, which saves the second that a new one takes to load."""
+    out, err = io.StringIO(), io.StringIO()
+    words = ["sandboil", *map(str, arguments)]
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        patch.setattr(sys, "argv", words)
+        with pytest.raises(SystemExit) as exited:
+            main()
+    code = exited.value.code
+    assert isinstance(code, int)
+    return subprocess.CompletedProcess(words, code, out.getvalue(), err.getvalue())
+
+
+def refused(*arguments: object) -> str:
+    """What the command says on stderr when it refuses its input: one line, and nothing on stdout."""
+    done = called(*arguments)
+    assert (done.returncode, done.stdout) == (INVALID, "")
+    assert done.stderr.startswith("sandboil: ")
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+@pytest.fixture
+def scene_file(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    scenes.column().to_toml(path)
+    return path
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Path:
+    path = tmp_path / "record.csv"
+    scenes.PULSE.scaled(pga_g=0.1).write_csv(path)
+    return path
+
+
+# From scene to pictures
+
+
+def test_plan_run_and_plot(scene_file: Path, tmp_path: Path) -> None:
+    planned = called("plan", scene_file)
+    assert (planned.returncode, planned.stderr) == (DONE, "")
+    assert "steps of" in planned.stdout
+    out = tmp_path / "out"
+    done = sandboil("run", scene_file, "--out", out, "--threads", 1, "--accuracy", "draft")
+    # No bar where nobody watches.
+    assert (done.returncode, done.stderr) == (DONE, "")
+    results = load(out)
+    assert done.stdout == f"{results.summary()}\n"
+    assert (results.status, results.accuracy) == ("complete", "draft")
+    drawn = called("plot", out)
+    assert (drawn.returncode, drawn.stderr) == (DONE, "")
+    assert all(Path(line).is_file() for line in drawn.stdout.splitlines())
+    assert len(drawn.stdout.splitlines()) == 4
+
+
+def test_another_motion_shakes_the_scene(scene_file: Path, record: Path, tmp_path: Path) -> None:
+    chosen = ("--motion", record, "--column", "acceleration_g")
+    assert called("run", scene_file, "--out", tmp_path / "out", *chosen).returncode == DONE
+    motion = load(tmp_path / "out").motion()
+    assert motion is not None
+    assert motion.pga_g == pytest.approx(0.1)
+
+
+def test_only_commands_that_work_are_offered() -> None:
+    told = called("--help").stdout
+    assert all(name in told for name in ("plan", "run", "plot", "motion"))
+    assert not any(name in told for name in ("lab", "report", "trade", "study"))
+    assert "--resume" not in called("run", "--help").stdout
+
+
+# Refused: exit code 2
+
+
+def test_a_misspelt_key_is_refused_with_the_right_one(scene_file: Path, tmp_path: Path) -> None:
+    scene_file.write_text(
+        scene_file.read_text().replace("hydraulic_conductivity", "hydraulic_conductivty", 1)
+    )
+    for told in (refused("plan", scene_file), refused("run", scene_file, "--out", tmp_path / "out")):
+        assert "scene.regions[0].hydraulic_conductivty" in told
+        assert "did you mean 'hydraulic_conductivity'" in told
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scene_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    assert "must be a readable TOML file" in refused("plan", tmp_path / "none.toml")
+
+
+def test_a_folder_that_holds_a_run_is_refused(scene_file: Path, finished: Run) -> None:
+    assert "must not hold a run" in refused("run", scene_file, "--out", finished.path.parent)
+
+
+def test_an_unwritable_folder_is_refused(scene_file: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert "is a file" in refused("run", scene_file, "--out", tmp_path / "file" / "out")
+
+
+def test_a_motion_that_cannot_be_read_is_refused(scene_file: Path, tmp_path: Path) -> None:
+    none = tmp_path / "none.AT2"
+    assert "cannot be read" in refused("run", scene_file, "--out", tmp_path / "out", "--motion", none)
+    assert "belongs to a --motion" in refused("plan", scene_file, "--unit", "g")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_without_results_is_refused(tmp_path: Path) -> None:
+    assert "must hold a results.h5" in refused("plot", tmp_path)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run",),
+        ("run", "scene.toml", "--out", "out", "--accuracy", "perfect"),
+        ("run", "scene.toml", "--out", "out", "--threads", "many"),
+        ("fly",),
+    ],
+)
+def test_misuse_of_the_command_is_refused(arguments: tuple[str, ...]) -> None:
+    done = called(*arguments)
+    assert (done.returncode, done.stdout) == (INVALID, "")
+    assert "Traceback" not in done.stderr
+
+
+# Stopped: exit codes 3 and 130
+
+
+def test_divergence_exits_with_3_and_keeps_results(tmp_path: Path) -> None:
+    scenes.diverging_column().to_toml(tmp_path / "scene.toml")
+    done = sandboil("run", tmp_path / "scene.toml", "--out", tmp_path / "out")
+    assert (done.returncode, done.stdout) == (STOPPED, "")
+    told = done.stderr.replace("\n", " ")
+    for part in ("diverged", "node", "time", "step", str(tmp_path / "out" / "results.h5")):
+        assert part in told
+    assert "Traceback" not in told
+    results = load(tmp_path / "out")
+    assert results.status == "stopped"
+    assert results.message in told
+    assert "stopped" in str(results.summary())
+
+
+def test_interrupting_exits_with_130_and_leaves_a_readable_file(tmp_path: Path) -> None:
+    endless = scenes.column(stages=[Gravity(), Shaking(scenes.PULSE, duration=1000.0)])
+    endless.to_toml(tmp_path / "scene.toml")
+    out = tmp_path / "out"
+    process = subprocess.Popen(
+        command("run", tmp_path / "scene.toml", "--out", out),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60.0
+    while not ((out / "results.h5").exists() and (out / "results.h5").stat().st_size > 100_000):
+        assert process.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == INTERRUPTED
+    assert "interrupted in shaking" in told
+    assert "Traceback" not in told
+    results = load(out)
+    assert results.status == "interrupted"
+    assert np.isfinite(results.field_series("velocity")).all()
+    assert called("plot", out).returncode == DONE
+
+
+# Motions
+
+
+def test_motion_info_measures(record: Path) -> None:
+    told = called("motion", "info", record, "--column", "acceleration_g")
+    assert told.returncode == DONE
+    lines = dict(line.rsplit("  ", 1) for line in told.stdout.splitlines() if "  " in line)
+    found = {name.strip(): value.strip() for name, value in lines.items()}
+    assert found["peak acceleration"] == "0.1 g"
+    assert found["points"] == str(len(scenes.PULSE.time))
+
+
+def test_motion_spectrum_is_csv(record: Path) -> None:
+    told = called("motion", "spectrum", record, "--damping", "0.1")
+    assert told.returncode == DONE
+    header, *rows = told.stdout.splitlines()
+    assert header == "period_s,psa_g"
+    table = np.array([row.split(",") for row in rows], dtype=float)
+    expected = Motion.from_csv(record).response_spectrum(0.1)
+    np.testing.assert_allclose(table, np.column_stack([expected.periods, expected.psa_g]), rtol=1e-5)
+
+
+def test_motion_convert_scales_filters_and_changes_the_form(record: Path, tmp_path: Path) -> None:
+    out = tmp_path / "converted.AT2"
+    assert called("motion", "convert", record, "--out", out, "--pga", 0.2, "--high", 20).returncode == DONE
+    expected = Motion.from_csv(record).filtered(high=20.0).scaled(pga_g=0.2)
+    np.testing.assert_allclose(Motion.from_at2(out).acceleration_g, expected.acceleration_g, atol=1e-7)
+    assert "must end in .AT2 or .csv" in refused("motion", "convert", record, "--out", tmp_path / "x.txt")
+    assert "must be stated" in refused("motion", "info", unitless(tmp_path))
+
+
+def unitless(folder: Path) -> Path:
+    path = folder / "unitless.csv"
+    path.write_text("time,acceleration\n0.0,0.1\n0.01,0.2\n")
+    return path
