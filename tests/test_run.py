@@ -19,6 +19,7 @@ from sandboil import (
     InvalidInput,
     Motion,
     Numerics,
+    Region,
     Run,
     RunInterrupted,
     SandboilError,
@@ -26,6 +27,7 @@ from sandboil import (
     Shaking,
     Simulation,
     SimulationDiverged,
+    box,
     discretise,
     load,
     run,
@@ -104,7 +106,7 @@ def test_shear_strain_and_stress_of_an_upgoing_wave_have_the_textbook_signs() ->
     """A wave going up with u = f(t - y/c) strains the soil by -v/c and stresses it by -rho c v."""
     motion = Motion.ricker(frequency=4.0, pga_g=0.1)
     tall = scenes.dry_column(
-        regions=[scenes.Region("rock", scenes.box(x=(0, 0.5), y=(0, 40)), scenes.ROCK, dry_unit_weight=20.0)],
+        regions=[Region("rock", box(x=(0, 0.5), y=(0, 40)), scenes.ROCK, dry_unit_weight=20.0)],
         spacing=0.5,
         stages=[Gravity(), Shaking(motion, duration=2.0)],
     )

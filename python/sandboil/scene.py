@@ -560,7 +560,7 @@ class Scene(Model):
     _label: ClassVar[str] = "scene"
 
     spacing: Number = Field(gt=0.0, description="particle spacing, m")
-    gravity: Number = Field(9.81, gt=0.0, description="m/s2")
+    gravity: Number = Field(default=9.81, gt=0.0, description="m/s2")
     water: Water | None = None
     water_table: WaterTable | None = None
     regions: Many[Region] = Field(min_length=1)
