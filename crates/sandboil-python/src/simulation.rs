@@ -12,6 +12,9 @@ use std::time::{Duration, Instant};
 /// Steps between looks at the clock.
 const STEPS_PER_LOOK: u64 = 32;
 
+/// Times and values of history samples.
+type Histories<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>);
+
 fn get<'py, T>(dict: &Bound<'py, PyDict>, key: &str) -> PyResult<T>
 where
     T: for<'a> FromPyObject<'a, 'py>,
@@ -151,6 +154,7 @@ impl Simulation {
         Ok(self.inner.begin_shaking(stage).map_err(CoreError)?)
     }
 
+    #[expect(clippy::needless_pass_by_value, reason = "PyO3 hands arguments over by value")]
     fn set_excess_pore_pressure(&mut self, excess: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
         Ok(self.inner.set_excess_pore_pressure(excess.as_slice()?).map_err(CoreError)?)
     }
@@ -289,10 +293,7 @@ impl Simulation {
     }
 
     /// History samples since the last call: times (m,) and values (m, probes, channels).
-    fn take_histories<'py>(
-        &mut self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>)> {
+    fn take_histories<'py>(&mut self, py: Python<'py>) -> PyResult<Histories<'py>> {
         let (times, values) = self.inner.take_histories();
         let channels = self.inner.channel_names().len();
         let samples = times.len();
