@@ -365,6 +365,9 @@ def test_only_what_the_scene_requires_is_active() -> None:
     dry = dry_column(dry_unit_weight=18.0)
     assert active(dry) == always | {"base dashpots"}
     assert active(dry.model_copy(update={"stages": (Gravity(),)})) == always
+    at_rest = column(stages=[Gravity()])
+    assert active(at_rest) == always | {"pore water"}
+    assert ("water diffusion", False, "no shaking stage") in at_rest.active_physics()
     undrained = column(regions=[Region("sand", box(x=(0, 1), y=(0, 10)), SAND, Gs=2.67)])
     assert active(undrained) == always | {"pore water", "PM4Sand state", "base dashpots"}
     damped = column(numerics=Numerics(local_damping=0.05, velocity_filter=0.0))

@@ -21,7 +21,7 @@ TRIAL_SECONDS = 1.5
 # under natural water (2.2e6 kPa) has 0.95.
 LEAST_COEFFICIENT = 0.9
 
-_BYTES_PER_MB = 1.0e6
+_BYTES_PER_KB, _BYTES_PER_MB = 1.0e3, 1.0e6
 
 
 @dataclass(frozen=True)
@@ -99,9 +99,9 @@ class Plan:
             f"wall time     {_duration(self.wall_time)}, threads: {self.threads}. From a trial of up to "
             f"{TRIAL_SECONDS:g} s a stage, of shaking in its strong",
             "              part: a step costs less at rest, and more in liquefied sand.",
-            f"memory        {sum(self.arrays.values()) / _BYTES_PER_MB:.3g} MB in "
-            f"{', '.join(f'{name} {size / _BYTES_PER_MB:.2g}' for name, size in self.arrays.items())}",
-            f"results file  {self.file_size / _BYTES_PER_MB:.3g} MB before compression",
+            f"memory        {_size(sum(self.arrays.values()))}: "
+            f"{', '.join(f'{name} {_size(size)}' for name, size in self.arrays.items())}",
+            f"results file  {_size(self.file_size)} before compression",
         ]
         if self.pore_pressure_coefficients:
             lines += ["", "pore pressure coefficient B, the lowest in each region"]
@@ -132,6 +132,12 @@ def _duration(seconds: float | None) -> str:
     if seconds < 90.0:
         return f"about {seconds:.2g} s"
     return f"about {seconds / 60.0:.2g} min" if seconds < 5400.0 else f"about {seconds / 3600.0:.2g} h"
+
+
+def _size(count: int) -> str:
+    if count < _BYTES_PER_MB:
+        return f"{count / _BYTES_PER_KB:.3g} kB"
+    return f"{count / _BYTES_PER_MB:.4g} MB"
 
 
 def described_coefficient(value: float) -> str:

@@ -782,34 +782,38 @@ class Scene(Model):
         permeable = [region.name for region in self.regions if region.hydraulic_conductivity]
         sands = [region.name for region in self.regions if isinstance(region.material, PM4Sand)]
         shaken = any(isinstance(stage, Shaking) for stage in self.stages)
-        flows = wet and bool(permeable)
         damping = self.numerics.local_damping
-        dry = "the scene has no water"
-        if not flows:
-            acceleration_reason = "no water flows"
-        elif self.numerics.acceleration_term != "auto":
-            acceleration_reason = f"numerics.acceleration_term is {self.numerics.acceleration_term!r}"
-        else:
-            compared = "no region exceeds" if self.uses_acceleration_term else "a region exceeds"
-            acceleration_reason = f"{compared} {ACCELERATION_TERM_CONDUCTIVITY:g} m/s"
+        dry, still = "the scene has no water", "no shaking stage"
+
+        def active(name: str, reason: str, *missing: tuple[bool, str]) -> tuple[str, bool, str]:
+            """`name` is active for its reason, unless something is missing: then the first such reason."""
+            lacking = [why for is_missing, why in missing if is_missing]
+            return (name, not lacking, lacking[0] if lacking else reason)
+
+        no_flow = ((not wet, dry), (not shaken, still), (not permeable, "no region is permeable"))
+        term = self.numerics.acceleration_term
+        compared = "no region exceeds" if self.uses_acceleration_term else "a region exceeds"
+        chosen = f"{compared} {ACCELERATION_TERM_CONDUCTIVITY:g} m/s"
+        if term != "auto":
+            chosen = f"numerics.acceleration_term is {term!r}"
         return [
-            ("pore water", wet, f"water table at elevation {self.water_level:g} m" if wet else dry),
-            (
-                "water diffusion",
-                flows,
-                f"conductivity in {', '.join(permeable)}"
-                if flows
-                else ("no region is permeable" if wet else dry),
-            ),
-            ("water acceleration", self.uses_acceleration_term, acceleration_reason),
+            active("pore water", f"water table at elevation {self.water_level or 0.0:g} m", (not wet, dry)),
+            active("water diffusion", f"conductivity in {', '.join(permeable)}", *no_flow),
+            active("water acceleration", chosen, *no_flow, (not self.uses_acceleration_term, chosen)),
             ("partial saturation", False, "the water table is nowhere below the ground" if wet else dry),
-            ("PM4Sand state", bool(sands), f"in {', '.join(sands)}" if sands else "no PM4Sand region"),
-            ("base dashpots", shaken, "compliant base while shaking" if shaken else "no shaking stage"),
+            active(
+                "PM4Sand state",
+                f"in {', '.join(sands)}",
+                (not sands, "no PM4Sand region"),
+                (not shaken, still),
+            ),
+            active("base dashpots", "compliant base while shaking", (not shaken, still)),
             ("free-field columns", False, "the sides are periodic"),
-            (
+            active(
                 "local damping",
-                shaken and damping > 0.0,
-                f"numerics.local_damping is {damping:g}" if shaken else "no shaking stage",
+                f"numerics.local_damping is {damping:g}",
+                (not shaken, still),
+                (damping == 0.0, "numerics.local_damping is 0"),
             ),
             (
                 "velocity filter",
