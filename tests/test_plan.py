@@ -76,7 +76,7 @@ def test_a_dry_scene_without_shaking_plans_neither() -> None:
     assert plan.pore_pressure_coefficients == {}
     assert "coefficient B" not in str(plan)
     assert {name for name, on, _ in plan.physics if on} == {"velocity filter"}
-    assert set(plan.arrays) == {"motion", "stress", "geometry"}
+    assert set(plan.arrays) == {"motion", "stress", "geometry", "phases"}
 
 
 def test_a_long_way_to_rest_is_not_foretold(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -161,7 +161,7 @@ def test_what_is_not_there_is_refused_with_what_is(finished: Run) -> None:
         (lambda: finished.history("r_u", at=(0.25, 3.0), depth=1.0), "takes one of the two"),
         (lambda: finished.history("r_u", depth=1.0, stage="shakin"), "did you mean 'shaking'"),
         (lambda: finished.field("displacment"), "did you mean 'displacement'"),
-        (lambda: finished.field("r_u", 50.0), "lie in [0, 0.799"),
+        (lambda: finished.field("r_u", 50.0), "lie in [0, 0.8000"),
         (lambda: finished.field("r_u", "first"), "must be 'last'"),
         (lambda: finished.envelope("velocity"), "r_u"),
         (lambda: finished.profile("r_u", x=7.0), "[0, 0.5]"),

@@ -20,9 +20,6 @@ LOOK_INTERVAL = 0.1
 # More steps than any stage makes; the core counts in 64 bits.
 _NO_LIMIT = 2**62
 
-# Porosity handed on for a dry soil that leaves it open: only (1 - n) times the grain density is ever used.
-_NOMINAL_POROSITY = 0.5
-
 
 @dataclass(frozen=True)
 class Quantity:
@@ -405,14 +402,12 @@ def _description(scene: Scene, particles: Discretisation) -> dict[str, Any]:
 
 def _region(scene: Scene, region: Region) -> dict[str, Any]:
     soil = region.resolved(scene)
-    open_porosity = soil.porosity == 0.0
-    porosity = _NOMINAL_POROSITY if open_porosity else soil.porosity
     gravity = next(stage for stage in scene.stages if isinstance(stage, Gravity))
     poisson = gravity.initial_poisson_ratio
     return {
         "material": material_description(region),
-        "porosity": porosity,
-        "solid_density": soil.dry_density / (1.0 - porosity),
+        "porosity": soil.porosity,
+        "solid_density": soil.solid_density,
         "hydraulic_conductivity": region.hydraulic_conductivity or 0.0,
         "earth_pressure_coefficient": region.K0,
         "static_poisson_ratio": region.initial_poisson_ratio if poisson is None else poisson,
