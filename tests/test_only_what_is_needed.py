@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 import scenes
-from sandboil import Elastic, Gravity, Numerics, Numerics, Output, Region, Scene, Simulation, box
+from sandboil import Elastic, Gravity, Numerics, Output, Region, Scene, Simulation, box
 
 
 def at_the_end(scene: Scene) -> Simulation:

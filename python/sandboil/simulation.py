@@ -40,7 +40,7 @@ FIELDS: dict[str, Quantity] = {
     "r_u_stress": Quantity("1", "one minus vertical effective stress over its geostatic value"),
     "sigma_v_eff": Quantity("kPa", "vertical effective stress, compression positive"),
     "sigma_h_eff": Quantity("kPa", "horizontal effective stress, compression positive"),
-    "p_eff": Quantity("kPa", "mean of the three normal effective stresses, compression positive"),
+    "p_eff": Quantity("kPa", "mean (sigma_v_eff + sigma_h_eff)/2 in the plane, as in PM4Sand, compression positive"),
     "tau_xy": Quantity("kPa", "shear stress, positive with a positive gamma_xy"),
     "gamma_xy": Quantity("1", "engineering shear strain since the stage began"),
     "gamma_max": Quantity("1", "largest engineering shear strain in the plane since the stage began"),
@@ -277,7 +277,8 @@ class Simulation:
         core, particles = self._core, self.particles
         excess = core.excess_pore_pressure()
         stress, strain = core.stress(), core.strain()
-        sigma_h, sigma_v, tau, sigma_z = (stress.mean(axis=1) * (-1.0, -1.0, 1.0, -1.0)).T
+        # The out-of-plane stress is left out: PM4Sand does not use it, and nothing keeps it physical.
+        sigma_h, sigma_v, tau = (stress.mean(axis=1)[:, :3] * (-1.0, -1.0, 1.0)).T
         values: dict[str, Floats] = {
             "displacement": core.displacement(),
             "velocity": core.velocity(),
@@ -285,7 +286,7 @@ class Simulation:
             "r_u_stress": 1.0 - pore_pressure_ratio(sigma_v, particles.sigma_v_eff0),
             "sigma_v_eff": sigma_v,
             "sigma_h_eff": sigma_h,
-            "p_eff": (sigma_v + sigma_h + sigma_z) / 3.0,
+            "p_eff": 0.5 * (sigma_v + sigma_h),
             "tau_xy": tau,
             "gamma_xy": strain[:, :, 2].mean(axis=1),
             "gamma_max": np.hypot(strain[:, :, 0] - strain[:, :, 1], strain[:, :, 2]).max(axis=1),
