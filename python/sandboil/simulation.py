@@ -34,7 +34,7 @@ FIELDS: dict[str, Quantity] = {
     "displacement": Quantity("m", "since the scene was made, (x, y)"),
     "velocity": Quantity("m/s", "(x, y)"),
     "acceleration": Quantity("m/s2", "(x, y)"),
-    "excess_pore_pressure": Quantity("kPa", "since the stage began, compression positive"),
+    "excess_pore_pressure": Quantity("kPa", "since shaking began, compression positive"),
     "pore_pressure": Quantity("kPa", "hydrostatic and excess, compression positive"),
     "r_u": Quantity("1", "excess pore pressure over the geostatic vertical effective stress"),
     "r_u_stress": Quantity("1", "one minus vertical effective stress over its geostatic value"),

@@ -14,7 +14,7 @@ use crate::{
     soil_field::SoilField,
     timestep::{Criterion, PressureCoupling, PressureSpectrum, region_limit},
 };
-use sandboil_soil::{Stress, UpdateReport};
+use sandboil_soil::{SoilError, Stress, UpdateReport};
 use sandboil_sph::Vec2;
 
 /// Steps between checks of stability limit, geometry and finiteness.
@@ -235,6 +235,8 @@ impl Simulation {
 
     /// Begins shaking: sand becomes plastic, the base compliant, and whatever force the new base and the state
     /// at rest leave unbalanced is stored as a constant nodal reaction, so that nothing moves until a wave comes.
+    /// After another shaking stage the ground goes on as it is: sand, water and motion keep their state, and only
+    /// strains, envelopes and the base's impedance begin anew.
     ///
     /// # Errors
     /// A soil model that refuses the stress it is given.
@@ -248,21 +250,30 @@ impl Simulation {
                 return Err(SolverError::InvalidInput { name, value, expected: "positive" });
             }
         }
-        self.set_wall(match self.model.numerics.operators {
-            Operators::Conservative => Wall::TRACTION,
-            Operators::Printed => Wall::FREE_SLIP,
-        });
-        self.velocity.fill(Vec2::zeros());
-        self.acceleration.fill(Vec2::zeros());
+        let goes_on = matches!(self.active, Active::Shaking(_));
+        if goes_on {
+            self.renew_geometry();
+        } else {
+            self.set_wall(match self.model.numerics.operators {
+                Operators::Conservative => Wall::TRACTION,
+                Operators::Printed => Wall::FREE_SLIP,
+            });
+            self.velocity.fill(Vec2::zeros());
+            self.acceleration.fill(Vec2::zeros());
+            self.soil = SoilField::plastic(&self.model, &mut self.points)?;
+        }
         self.phases.restart_strain();
         for point in &mut self.points {
             point.strain = [0.0; 3];
         }
-        self.soil = SoilField::plastic(&self.model, &mut self.points)?;
         let impedance = self.base_impedance(stage.half_space);
         let base = CompliantBase::new(&self.model, &self.position, &self.mass, impedance, stage.wave.clone());
         let scheme = self.flow_scheme(stage.time_step_factor);
+        let excess = self.flow.take().map(|flow| flow.excess);
         self.flow = Flow::new(&self.model, &self.phases, scheme);
+        if let (Some(flow), Some(excess)) = (&mut self.flow, excess) {
+            flow.excess = excess;
+        }
         let coupling = match (&self.flow, scheme) {
             (None, _) => PressureCoupling::None,
             (_, FlowScheme::Implicit) => PressureCoupling::Implicit,
@@ -290,7 +301,9 @@ impl Simulation {
             probes,
             stage,
         })));
-        self.store_reaction();
+        if !goes_on {
+            self.store_reaction();
+        }
         Ok(())
     }
 
@@ -601,7 +614,12 @@ impl Simulation {
             &self.model.numerics.integrator,
         );
         let report = report.map_err(|error| match error {
-            SolverError::Soil { node, .. } => self.diverged("soil state", node, f64::NAN),
+            SolverError::Soil { node, source, .. } => match source {
+                SoilError::StrainIncrementTooLarge { value, .. } => {
+                    self.diverged("strain of a step", node, value)
+                }
+                _ => self.diverged("soil state", node, f64::NAN),
+            },
             other => other,
         })?;
         self.counters.soil.merge(&report);
@@ -902,7 +920,7 @@ impl Simulation {
         self.in_user_order(|j| self.acceleration[j].into())
     }
 
-    /// Excess pore pressure since the stage began, kPa; `None` without water.
+    /// Excess pore pressure since shaking began, kPa; `None` without water.
     pub fn excess_pore_pressure(&self) -> Option<Vec<f64>> {
         self.model.water?;
         Some(self.in_user_order(|j| self.flow.as_ref().map_or(0.0, |flow| flow.excess[j])))

@@ -8,7 +8,7 @@ use crate::{
     skeleton::{NodalShare, StressPoint, motion},
 };
 use sandboil_soil::{
-    Integrator, Moduli, SoilError, UpdateReport,
+    Integrator, Moduli, SoilError, StrainIncrement, UpdateReport,
     elastic::Elastic,
     pm4sand::{PM4Sand, State},
 };
@@ -42,6 +42,20 @@ pub struct SoilField {
     groups: Vec<Group>,
     outcomes: Vec<Outcome>,
     unit: Vec<()>,
+}
+
+/// Largest strain component of one step: a thousand times what an earthquake does, and far below what plasticity
+/// would need minutes to follow. Beyond it the run has diverged.
+const LARGEST_STEP: f64 = 0.02;
+
+/// Refuses the strain of a diverging run before the soil model goes through it.
+fn bounded(increment: &StrainIncrement) -> Result<(), SoilError> {
+    let value = increment.xx.abs().max(increment.yy.abs()).max(increment.xy.abs());
+    // NaN goes on to the model, which names it.
+    if value > LARGEST_STEP {
+        return Err(SoilError::StrainIncrementTooLarge { value, limit: LARGEST_STEP });
+    }
+    Ok(())
 }
 
 fn stiffness(moduli: Moduli) -> f64 {
@@ -161,7 +175,9 @@ impl SoilField {
                             let s = first_row + first + k;
                             let motion = motion(geometry, s, velocity);
                             let increment = motion.advance(&mut point.deformation, dt);
-                            match material.update(state, &increment, integrator) {
+                            let updated = bounded(&increment)
+                                .and_then(|()| material.update(state, &increment, integrator));
+                            match updated {
                                 Ok(report) => outcome.report.merge(&report),
                                 Err(error) => {
                                     outcome.failure = Some((s, error));
@@ -206,7 +222,7 @@ fn set_moduli(point: &mut StressPoint, moduli: Moduli) {
     point.stiffness = stiffness(moduli);
 }
 
-fn add_strain(point: &mut StressPoint, increment: &sandboil_soil::StrainIncrement) {
+fn add_strain(point: &mut StressPoint, increment: &StrainIncrement) {
     point.strain[0] += increment.xx;
     point.strain[1] += increment.yy;
     point.strain[2] += increment.xy;

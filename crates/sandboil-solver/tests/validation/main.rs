@@ -4,5 +4,5 @@
 
 mod common;
 mod consolidation;
-mod rest;
+mod stages;
 mod wave_column;

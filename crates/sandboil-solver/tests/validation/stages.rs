@@ -1,8 +1,9 @@
-//! States of rest: what gravity leaves, and that the switch to the compliant base starts nothing.
+//! Switches between stages: what gravity leaves, that the compliant base starts nothing, and that shaking goes on.
 
 use crate::common::{column, elastic, shaking};
 use sandboil_soil::pm4sand::{Options, PM4Sand, Parameters};
-use sandboil_solver::{Gravity, Model, Operators, Simulation, Soil, Water};
+use sandboil_solver::{Gravity, Model, Operators, Simulation, Soil, UpgoingWave, Water};
+use std::f64::consts::PI;
 
 const HEIGHT: f64 = 10.0;
 const SPACING: f64 = 0.4;
@@ -62,4 +63,46 @@ fn gravity_keeps_the_geostatic_state() {
     println!("rms {rms:.3} rho' g dx, {} steps", simulation.step());
     assert!(rms < 0.15, "{rms}");
     assert!(simulation.step() < 600);
+}
+
+/// One stage of shaking or the same in two: the ground does not notice.
+#[test]
+fn a_second_shaking_stage_goes_on_where_the_first_ended() {
+    const INTERVAL: f64 = 1e-3;
+    const HALF: f64 = 1.0;
+    let wave = |from: f64| UpgoingWave {
+        interval: INTERVAL,
+        velocity: (0..1000).map(|k| 0.2 * (4.0 * PI * (from + f64::from(k) * INTERVAL)).sin()).collect(),
+    };
+    let whole =
+        UpgoingWave { interval: INTERVAL, velocity: [wave(0.0).velocity, wave(HALF).velocity].concat() };
+    let shaken = |stages: &[(UpgoingWave, f64)]| {
+        let mut simulation = at_rest(&sand_column(Operators::Conservative));
+        for (wave, duration) in stages {
+            let mut stage = shaking(Some(wave.clone()), *duration, Vec::new());
+            stage.half_space = Some((200.0, 2.0));
+            simulation.begin_shaking(stage).unwrap();
+            assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
+        }
+        simulation
+    };
+    let one = shaken(&[(whole, 2.0 * HALF)]);
+    let two = shaken(&[(wave(0.0), HALF), (wave(HALF), HALF)]);
+    let (p, q) = (one.excess_pore_pressure().unwrap(), two.excess_pore_pressure().unwrap());
+    let largest = p.iter().copied().fold(0.0, f64::max);
+    let apart = p.iter().zip(&q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    println!("excess pore pressure up to {largest:.1} kPa, {apart:.2} kPa apart");
+    assert!(largest > 10.0 && apart < 0.02 * largest, "{largest} {apart}");
+}
+
+/// A step far too long is reported as soon as it strains sand beyond reason.
+#[test]
+fn a_bursting_sand_column_is_told_at_once() {
+    let mut simulation = at_rest(&sand_column(Operators::Conservative));
+    let velocity = (0..2000).map(|k| 0.5 * (0.03 * f64::from(k)).sin()).collect();
+    let mut stage = shaking(Some(UpgoingWave { interval: 1e-3, velocity }), 2.0, Vec::new());
+    stage.time_step_factor = 3.0;
+    simulation.begin_shaking(stage).unwrap();
+    let error = simulation.advance(u64::MAX, f64::INFINITY).unwrap_err();
+    assert!(matches!(error, sandboil_solver::SolverError::Diverged { .. }), "{error}");
 }
