@@ -6,21 +6,15 @@
 
 #[path = "../tests/point/mod.rs"]
 mod point;
+mod yardstick;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use point::{CALIBRATIONS, StrainPath, advance, consolidated, parts, sand, shear};
 use sandboil_soil::pm4sand::{PM4Sand, State};
 use sandboil_soil::{Integrator, StrainIncrement};
-use std::hint::black_box;
-use std::time::Instant;
 
 /// Largest strain component of a host step.
 const HOST_INCREMENTS: [f64; 3] = [1e-6, 2.5e-6, 1e-5];
-/// Yardsticks per timing: some 40 ms, as long as a walk, so that a busy machine slows both alike.
-const YARDSTICKS: u32 = 2_000_000;
-/// Timings of which the fastest counts: others on the machine only slow it down.
-const REPETITIONS: usize = 9;
-
 /// A material, where it starts and the host's steps.
 struct Walk {
     name: &'static str,
@@ -78,39 +72,14 @@ fn integrators() -> [(&'static str, Integrator); 3] {
     [("modified Euler", Integrator::default()), ("Runge-Kutta", rk4), ("reference", Integrator::Reference)]
 }
 
-/// One exponential, one power, one square root, each of numbers the compiler cannot foresee.
-fn yardsticks() -> f64 {
-    let mut sum = 0.0;
-    for i in 0..YARDSTICKS {
-        let x = black_box(1.0 + 1e-6 * f64::from(i));
-        sum += (-x).exp() + x.powf(black_box(0.3)) + x.sqrt();
-    }
-    sum
-}
-
-fn seconds<T>(work: impl FnOnce() -> T) -> f64 {
-    let start = Instant::now();
-    black_box(work());
-    start.elapsed().as_secs_f64()
-}
-
 #[expect(clippy::print_stdout, reason = "a bench reports")]
 fn compare_with_yardstick() {
     println!("walk, integrator, increment, updates per second, yardsticks per update");
     for increment in HOST_INCREMENTS {
         for walk in [Walk::along_sp1(increment), Walk::liquefied(increment)] {
             for (name, integrator) in integrators() {
-                let (mut update, mut yardstick) = (f64::INFINITY, f64::INFINITY);
-                for _ in 0..REPETITIONS {
-                    update = update.min(seconds(|| walk.run(&integrator)) / walk.updates());
-                    yardstick = yardstick.min(seconds(yardsticks) / f64::from(YARDSTICKS));
-                }
-                println!(
-                    "{}, {name}, {increment:e}, {:.3e}, {:.2}",
-                    walk.name,
-                    1.0 / update,
-                    update / yardstick
-                );
+                let (update, ratio) = yardstick::compared(walk.updates(), || walk.run(&integrator));
+                println!("{}, {name}, {increment:e}, {:.3e}, {:.2}", walk.name, 1.0 / update, ratio);
             }
         }
     }

@@ -53,13 +53,6 @@ pub fn column(height: f64, spacing: f64, columns: usize, region: Region, water: 
     }
 }
 
-/// The same column without weight: initial stress turns with the soil and would change its wave speed.
-pub fn weightless(mut model: Model) -> Model {
-    model.gravity *= 1e-9;
-    model.vertical_effective_stress.fill(0.0);
-    model
-}
-
 /// Linear elastic soil of mixture density 2 Mg/m3 when dry.
 pub fn elastic(shear_modulus: f64, bulk_modulus: f64) -> Region {
     Region {

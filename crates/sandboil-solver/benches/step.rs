@@ -1,0 +1,97 @@
+//! What a step costs, and what building a geometry costs, per node on one thread and on two.
+//!
+//! The table compares machines: each figure also in yardsticks (one exponential, one power and one square root),
+//! timed in turn with it.
+#![allow(clippy::unwrap_used)] // a failure ends the bench
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // row counts of small columns
+
+#[path = "../tests/validation/common.rs"]
+mod common;
+#[path = "../../sandboil-soil/benches/yardstick/mod.rs"]
+mod yardstick;
+
+use common::{column, elastic, shaking};
+use criterion::{BenchmarkId, Criterion, Throughput};
+use sandboil_soil::pm4sand::{Options, PM4Sand, Parameters};
+use sandboil_solver::{Gravity, Model, Simulation, Soil, UpgoingWave, Water};
+
+const WATER: Water = Water { unit_weight: 10.0, bulk_modulus: 1e6 };
+/// Height over spacing of the blocks.
+const ROWS: usize = 100;
+const SPACING: f64 = 0.2;
+/// Gravity steps before a block of sand is shaken: near enough to rest for a bench.
+const RELAXATION: u64 = 300;
+/// Steps into the shaking before the clock runs: the wave has then crossed the block.
+const LEAD: u64 = 2000;
+
+/// What is stepped: elastic ground, dry or saturated, and sand on its way to liquefaction.
+#[derive(Debug, Clone, Copy)]
+enum Ground {
+    Dry,
+    Undrained,
+    Sand,
+}
+
+fn model(ground: Ground, columns: usize) -> Model {
+    let height = ROWS as f64 * SPACING;
+    let mut region = elastic(8e4, 2.4e5);
+    let water = (!matches!(ground, Ground::Dry)).then_some(WATER);
+    if matches!(ground, Ground::Sand) {
+        let parameters = Parameters { dr: 0.55, g0: 677.0, hpo: 0.4, ..Parameters::default() };
+        region.soil = Soil::PM4Sand(Box::new(PM4Sand::new(parameters, Options::default()).unwrap()));
+        region.hydraulic_conductivity = 1e-3;
+    }
+    column(height, SPACING, columns, region, water)
+}
+
+/// A simulation under way, shaken by 0.2 m/s at 2 Hz.
+fn under_way(ground: Ground, columns: usize, threads: usize) -> Simulation {
+    let mut simulation = Simulation::new(&model(ground, columns), threads).unwrap();
+    simulation.begin_gravity(Gravity { tolerance: 1e-4, max_steps: 20_000 }).unwrap();
+    simulation.advance(RELAXATION, f64::INFINITY).unwrap();
+    let velocity = (0..20_000).map(|k| 0.1 * (4e-3 * std::f64::consts::PI * f64::from(k)).sin()).collect();
+    let stage = shaking(Some(UpgoingWave { interval: 1e-3, velocity }), 1e3, Vec::new());
+    simulation.begin_shaking(stage).unwrap();
+    simulation.advance(LEAD, f64::INFINITY).unwrap();
+    simulation
+}
+
+const CASES: [(&str, Ground, usize); 4] = [
+    ("dry elastic", Ground::Dry, 5),
+    ("dry elastic", Ground::Dry, 200),
+    ("undrained elastic", Ground::Undrained, 200),
+    ("liquefying sand", Ground::Sand, 5),
+];
+
+#[expect(clippy::print_stdout, reason = "a bench reports")]
+fn compare_with_yardstick() {
+    println!("work, nodes, threads, ns per node, yardsticks per node");
+    for (name, ground, columns) in CASES {
+        for threads in [1, 2] {
+            let mut simulation = under_way(ground, columns, threads);
+            let steps = (100_000 / simulation.nodes()).max(2) as u64;
+            let count = steps as f64 * simulation.nodes() as f64;
+            let (seconds, ratio) =
+                yardstick::compared(count, || simulation.advance(steps, f64::INFINITY).unwrap());
+            println!("step, {name}, {}, {threads}, {:.0}, {ratio:.2}", simulation.nodes(), 1e9 * seconds);
+        }
+    }
+    let wet = model(Ground::Undrained, 200);
+    let (seconds, ratio) = yardstick::compared(wet.nodes() as f64, || Simulation::new(&wet, 1).unwrap());
+    println!("build, undrained elastic, {}, 1, {:.0}, {ratio:.2}", wet.nodes(), 1e9 * seconds);
+}
+
+fn main() {
+    let mut criterion = Criterion::default().sample_size(10).configure_from_args();
+    let mut group = criterion.benchmark_group("step");
+    for (name, ground, columns) in CASES {
+        let mut simulation = under_way(ground, columns, 1);
+        group.throughput(Throughput::Elements(simulation.nodes() as u64));
+        group.bench_function(BenchmarkId::new(name, simulation.nodes()), |bencher| {
+            bencher.iter(|| simulation.advance(1, f64::INFINITY).unwrap());
+        });
+    }
+    group.finish();
+    compare_with_yardstick();
+    criterion.final_summary();
+}
