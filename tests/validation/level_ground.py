@@ -14,7 +14,6 @@ import argparse
 import csv
 import os
 import tempfile
-import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -173,53 +172,128 @@ ROWS: dict[str, dict[str, Any]] = {
 }
 
 
-def _measured(name: str, motion: sb.Motion) -> tuple[Figures, float, int, float]:
-    """Figures of a row, wall time of its shaking (s), steps and mean time step (s)."""
+DOCS = Path(__file__).parents[2] / "docs"
+# Where the measured rows are kept, the page that shows them between its two marks, and the picture of them.
+ROWS_FILE, PAGE, PICTURE = DOCS / "level_ground.csv", DOCS / "validation.md", DOCS / "figures" / "trade.png"
+BEGIN, END = "<!-- rows of tests/validation/level_ground.py -->", "<!-- end of rows -->"
+# Written as they are measured; per-depth figures as 4, 11 and 17 m.
+HEADER = (
+    "| row | wall, s | dt, 1e-4 s | PGA below 10 Hz (raw), g | r_u max 4, 11, 17 m | rms | "
+    "r_u(4 m) >= 0.9 at, s | at 20 s | at 40 s | spectrum, % |",
+    "|---|---|---|---|---|---|---|---|---|---|",
+)
+
+Row = dict[str, str]
+
+
+def _measured(name: str, motion: sb.Motion) -> Row:
+    """Run a row and compare it; every figure as text with all that is worth telling of it."""
     with tempfile.TemporaryDirectory() as folder:
         run = sb.run(scene(motion, **ROWS[name]), Path(folder) / "run", threads=2, progress=False)
         accounts = run.accounts("shaking")
-        steps = int(accounts["steps"])
-        return figures(run), float(accounts["wall_time_s"]), steps, DURATION / steps
+        found = asdict(figures(run))
+    plain = {
+        "wall_s": float(accounts["wall_time_s"]),
+        "steps": int(accounts["steps"]),
+        "evaluations_per_update": accounts["count_evaluations"] / accounts["count_plastic_updates"],
+    }
+    for key, value in found.items():
+        if isinstance(value, tuple):
+            plain |= {f"{key}_{depth}m": one for depth, one in zip(DEPTHS, value, strict=True)}
+        else:
+            plain[key] = value
+    return {"row": name} | {key: f"{value:.6g}" for key, value in plain.items()}
 
 
-def _line(name: str, found: Figures, wall: float, dt: float) -> str:
-    def three(values: tuple[float, ...], digits: int) -> str:
-        return " ".join(f"{value:.{digits}f}" for value in values)
+def _line(row: Row) -> str:
+    def number(key: str, digits: int, factor: float = 1.0) -> str:
+        return f"{factor * float(row[key]):.{digits}f}"
 
-    return (
-        f"| {name} | {wall:.0f} | {1e4 * dt:.2f} | {found.pga_10hz_g:.3f} ({found.pga_raw_g:.2f}) | "
-        f"{three(found.r_u_max, 3)} | {three(found.r_u_rms, 3)} | {found.first_090_s:.2f} | "
-        f"{three(found.r_u_20s, 3)} | {three(found.r_u_40s, 3)} | {100 * found.spectrum_difference:.1f} |"
-    )
+    def three(key: str) -> str:
+        return " ".join(number(f"{key}_{depth}m", 3) for depth in DEPTHS)
+
+    step = 1.0e4 * DURATION / float(row["steps"])
+    peaks = f"{number('pga_10hz_g', 3)} ({number('pga_raw_g', 2)})"
+    cells = [row["row"], number("wall_s", 0), f"{step:.2f}", peaks, three("r_u_max"), three("r_u_rms")]
+    cells += [number("first_090_s", 2), three("r_u_20s"), three("r_u_40s")]
+    cells += [number("spectrum_difference", 1, 100.0)]
+    return f"| {' | '.join(cells)} |"
 
 
-HEADER = (
-    "| row | wall, s | dt, 1e-4 s | PGA below 10 Hz (raw), g | r_u max 4, 11, 17 m | rms | "
-    "r_u(4 m) >= 0.9 at, s | at 20 s | at 40 s | spectrum, % |\n|---|---|---|---|---|---|---|---|---|---|"
-)
+def _write_rows(rows: list[Row]) -> None:
+    with ROWS_FILE.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _write_page(rows: list[Row]) -> None:
+    """Replace the table between the page's marks."""
+    text = PAGE.read_text(encoding="utf-8")
+    before, rest = text.split(BEGIN)
+    _, after = rest.split(END)
+    table = "\n".join([BEGIN, *HEADER, *map(_line, rows), END])
+    PAGE.write_text(before + table + after, encoding="utf-8")
+
+
+def _draw(rows: list[Row]) -> None:
+    """Error against cost for spacing, and error against strength for the velocity filter."""
+    import matplotlib.pyplot as plt
+
+    by_name = {row["row"]: row for row in rows}
+    spacings = {0.4: "dx 0.4 m", 0.2: "default", 0.1: "dx 0.1 m"}
+    filters = {0.05: "filter 0.05", 0.1: "filter 0.1", 0.15: "filter 0.15", 0.2: "default"}
+    filters |= {0.3: "filter 0.3", 0.4: "filter 0.4"}
+
+    def errors(name: str) -> tuple[float, float]:
+        row = by_name[name]
+        r_u = np.mean([float(row[f"r_u_rms_{depth}m"]) for depth in DEPTHS])
+        return float(r_u), float(row["spectrum_difference"])
+
+    figure, axes = plt.subplots(1, 2, figsize=(10.0, 4.0), layout="constrained")
+    wall = [float(by_name[name]["wall_s"]) for name in spacings.values()]
+    for axis, x, names in (
+        (axes[0], wall, list(spacings.values())),
+        (axes[1], list(filters), list(filters.values())),
+    ):
+        r_u, spectrum = np.array([errors(name) for name in names]).T
+        axis.plot(x, r_u, "o-", color="#0072B2", label="r_u, rms of the history, mean of 4, 11, 17 m")
+        axis.plot(x, spectrum, "s-", color="#D55E00", label="surface spectrum, 5 %, 0.05 to 5 s, mean")
+        axis.set_ylim(0.0, None)
+        axis.grid(alpha=0.3)
+    for x, y, spacing in zip(wall, (errors(name)[1] for name in spacings.values()), spacings, strict=True):
+        axes[0].annotate(f"{spacing:g} m", (x, y), textcoords="offset points", xytext=(4, 6))
+    axes[0].set_xscale("log")
+    axes[0].set_xlabel("wall time of 40 s of shaking, s (one particle wide)")
+    axes[0].set_ylabel("difference from OpenSees, 1")
+    axes[0].set_title("spacing", loc="left")
+    axes[1].set_xlabel("strength of the velocity filter, 1")
+    axes[1].set_title("velocity filter at 0.2 m", loc="left")
+    axes[1].legend(frameon=False)
+    PICTURE.parent.mkdir(exist_ok=True)
+    figure.savefig(PICTURE, dpi=110)
+    plt.close(figure)
 
 
 def main() -> None:
-    """Measure rows and print them as lines of a table, and as CSV with every digit."""
+    """Measure rows anew and show them in docs/validation.md."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--records", type=Path, required=True, help=f"folder that holds {RECORD}")
-    parser.add_argument("--csv", type=Path, help="where to write every digit")
-    parser.add_argument("rows", nargs="*", default=list(ROWS), help="default: all")
+    parser.add_argument("--records", type=Path, help=f"folder that holds {RECORD}; without it only redraw")
+    parser.add_argument("rows", nargs="*", help="default: all")
     asked = parser.parse_args()
-    motion = sb.Motion.from_at2(asked.records / RECORD)
-    print(HEADER)
-    written = []
-    for name in asked.rows:
-        found, wall, steps, dt = _measured(name, motion)
-        print(_line(name, found, wall, dt), flush=True)
-        written.append(
-            {"row": name, "wall_s": wall, "steps": steps, **asdict(found), "at": time.strftime("%F")}
-        )
-    if asked.csv:
-        with asked.csv.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(written[0]))
-            writer.writeheader()
-            writer.writerows(written)
+    kept: dict[str, Row] = {}
+    if ROWS_FILE.exists():
+        with ROWS_FILE.open(newline="", encoding="utf-8") as file:
+            kept = {row["row"]: row for row in csv.DictReader(file)}
+    if asked.records:
+        motion = sb.Motion.from_at2(asked.records / RECORD)
+        for name in asked.rows or ROWS:
+            kept[name] = _measured(name, motion)
+            print(_line(kept[name]), flush=True)
+            _write_rows([kept[name] for name in ROWS if name in kept])
+    rows = [kept[name] for name in ROWS]
+    _write_page(rows)
+    _draw(rows)
 
 
 if __name__ == "__main__":

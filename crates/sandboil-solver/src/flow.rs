@@ -8,6 +8,7 @@ use crate::{
     deformation::{Cofactor, Deformation},
     geometry::FlowTables,
     model::{Model, STRESS_NODES},
+    parallel::{Rows, chunks, for_each_chunk},
     phases::Phases,
     skeleton::StressPoint,
 };
@@ -29,8 +30,6 @@ pub struct Flow {
     pub excess: Vec<f64>,
     /// `J F^-T` at velocity nodes: the mean deformation of their stress nodes.
     cofactor: Vec<Cofactor>,
-    /// `J` at velocity nodes.
-    volume_ratio: Vec<f64>,
     /// `K_f / n`: pressure rise per unit of volume strain, kPa.
     stiffness: Vec<f64>,
     /// Hydraulic conductivity, m/s.
@@ -74,7 +73,6 @@ impl Flow {
         Some(Self {
             excess: vec![0.0; model.nodes()],
             cofactor: vec![Deformation::default().cofactor(); model.nodes()],
-            volume_ratio: vec![1.0; model.nodes()],
             stiffness: (0..model.nodes()).map(|node| model.water_stiffness(phases.porosity(node))).collect(),
             conductivity: per_node(&|region| model.regions[region].hydraulic_conductivity),
             unit_weight: water.unit_weight,
@@ -96,7 +94,6 @@ impl Flow {
             *stiffness = model.water_stiffness(phases.porosity(node));
         }
         self.cofactor.fill(Deformation::default().cofactor());
-        self.volume_ratio.fill(1.0);
         if let Scheme::Implicit { factors } = &mut self.scheme {
             *factors = None;
         }
@@ -118,17 +115,7 @@ impl Flow {
             Scheme::Implicit { factors: Some((_, lu)) } => lu.bytes(),
             _ => 0,
         };
-        5 * size_of_val(self.excess.as_slice()) + size_of_val(self.cofactor.as_slice()) + factors
-    }
-
-    /// Follows the deformation of the skeleton since the geometry was built.
-    pub fn deform(&mut self, points: &[StressPoint]) {
-        let own = points.chunks_exact(STRESS_NODES);
-        for ((cofactor, ratio), own) in self.cofactor.iter_mut().zip(&mut self.volume_ratio).zip(own) {
-            let deformation = own[0].deformation.mean(&own[1].deformation);
-            *cofactor = deformation.cofactor();
-            *ratio = deformation.volume_ratio();
-        }
+        4 * size_of_val(self.excess.as_slice()) + size_of_val(self.cofactor.as_slice()) + factors
     }
 
     /// Force of the excess pressure on node `j`, kN/m: the exact transpose of the divergence.
@@ -138,36 +125,64 @@ impl Flow {
         row.map(|(i, weight)| self.cofactor[i].carry(*weight) * self.excess[i]).sum()
     }
 
-    /// Advances the excess pressure by one step from the velocity field at its middle (Eq. 7).
+    /// Advances the excess pressure by one step from the velocity field at its middle (Eq. 7) and the deformation of
+    /// the stress nodes at its end.
     ///
     /// Returns `false` when the implicit matrix cannot be factored (not finite).
     #[must_use]
-    pub fn step(&mut self, tables: &FlowTables, velocity: &[Vec2], acceleration: &[Vec2], dt: f64) -> bool {
+    pub fn step(
+        &mut self,
+        threaded: bool,
+        tables: &FlowTables,
+        points: &[StressPoint],
+        velocity: &[Vec2],
+        acceleration: &[Vec2],
+        dt: f64,
+    ) -> bool {
         let divergence = &tables.divergence.forward;
-        for node in 0..self.excess.len() {
-            let (mut x, mut y) = (Vec2::zeros(), Vec2::zeros());
-            for (j, weight) in divergence.iter_row(node) {
-                x += weight * velocity[j].x;
-                y += weight * velocity[j].y;
+        // Slices of nothing, which take no memory: the loops below write one array or two.
+        let mut unit = vec![(); self.excess.len()];
+        let mut results = vec![(); chunks(self.excess.len())];
+        let (excess, stiffness) = (&self.excess, &self.stiffness);
+        let rows = Rows { a: &mut self.right_hand_side, b: &mut self.cofactor, c: &mut unit };
+        for_each_chunk(threaded, rows, &mut results, |first, rows, ()| {
+            for (k, (right_hand_side, cofactor)) in rows.a.iter_mut().zip(rows.b).enumerate() {
+                let node = first + k;
+                let (mut x, mut y) = (Vec2::zeros(), Vec2::zeros());
+                for (j, weight) in divergence.iter_row(node) {
+                    x += weight * velocity[j].x;
+                    y += weight * velocity[j].y;
+                }
+                let [one, other] = [0, 1].map(|s| &points[STRESS_NODES * node + s].deformation);
+                let deformation = one.mean(other);
+                *cofactor = deformation.cofactor();
+                let volume_rate = cofactor.contract(x, y) / deformation.volume_ratio();
+                // dp = (gamma_f / C) dh-rate with C = n gamma_f / K_f.
+                *right_hand_side = excess[node] - dt * stiffness[node] * volume_rate;
             }
-            let volume_rate = self.cofactor[node].contract(x, y) / self.volume_ratio[node];
-            // dp = (gamma_f / C) dh-rate with C = n gamma_f / K_f.
-            self.right_hand_side[node] = self.excess[node] - dt * self.stiffness[node] * volume_rate;
-        }
+        });
         match (&mut self.scheme, &tables.diffusion) {
             (Scheme::Explicit { acceleration_term }, Some(diffusion)) => {
-                for node in 0..self.excess.len() {
-                    let mut rate: f64 =
-                        diffusion.iter_row(node).map(|(j, weight)| weight * self.excess[j]).sum();
-                    if *acceleration_term {
-                        let carried: f64 = divergence
-                            .iter_row(node)
-                            .map(|(j, weight)| weight.dot(&acceleration[j]) * self.conductivity[j])
-                            .sum();
-                        rate += carried * self.unit_weight / self.gravity;
+                let conductivity = &self.conductivity;
+                let acceleration_term = acceleration_term.then_some(self.unit_weight / self.gravity);
+                let scale = dt / self.unit_weight;
+                let mut other = vec![(); excess.len()];
+                let rows = Rows { a: &mut self.right_hand_side, b: &mut unit, c: &mut other };
+                for_each_chunk(threaded, rows, &mut results, |first, rows, ()| {
+                    for (k, right_hand_side) in rows.a.iter_mut().enumerate() {
+                        let node = first + k;
+                        let mut rate: f64 =
+                            diffusion.iter_row(node).map(|(j, weight)| weight * excess[j]).sum();
+                        if let Some(density) = acceleration_term {
+                            let carried: f64 = divergence
+                                .iter_row(node)
+                                .map(|(j, weight)| weight.dot(&acceleration[j]) * conductivity[j])
+                                .sum();
+                            rate += carried * density;
+                        }
+                        *right_hand_side += scale * stiffness[node] * rate;
                     }
-                    self.right_hand_side[node] += dt * self.stiffness[node] / self.unit_weight * rate;
-                }
+                });
                 self.excess.copy_from_slice(&self.right_hand_side);
                 self.hold_surface();
             }

@@ -695,8 +695,8 @@ impl Simulation {
         self.update_stress(dt)?;
         if let (Some(flow), Some(tables)) = (&mut self.flow, &self.geometry.flow) {
             self.counters.flow_calls += 1;
-            flow.deform(&self.points);
-            if !flow.step(tables, &self.velocity, &self.acceleration, dt) {
+            let (points, threaded) = (&self.points, self.threads > 1);
+            if !flow.step(threaded, tables, points, &self.velocity, &self.acceleration, dt) {
                 return Err(self.diverged("pore pressure matrix", 0, f64::NAN));
             }
         }
