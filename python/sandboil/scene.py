@@ -817,8 +817,10 @@ class Scene(Model):
             ),
             (
                 "velocity filter",
-                self.numerics.velocity_filter > 0.0,
-                f"numerics.velocity_filter is {self.numerics.velocity_filter:g}",
+                self.numerics.velocity_filter > 0.0 and self.numerics.operators == "conservative",
+                f"numerics.velocity_filter is {self.numerics.velocity_filter:g}"
+                if self.numerics.operators == "conservative"
+                else "the printed operators have none",
             ),
         ]
 

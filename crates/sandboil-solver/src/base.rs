@@ -1,7 +1,10 @@
 //! Compliant base (Eq. 14 as corrected): an incoming shear wave and a dashpot, through the trace of the
 //! velocity field on the base.
 
-use crate::{geometry::point_weights, model::Model};
+use crate::{
+    geometry::point_weights,
+    model::{Model, Operators},
+};
 use sandboil_sph::{Csr, Vec2};
 
 /// Velocity history of the upgoing wave at the base: half of an outcrop motion, m/s.
@@ -68,7 +71,10 @@ impl CompliantBase {
         wave: Option<UpgoingWave>,
     ) -> Self {
         let points = base_points(model, position);
-        let trace = point_weights(model, position, &points);
+        let trace = match model.numerics.operators {
+            Operators::Conservative => point_weights(model, position, &points),
+            Operators::Printed => lowest_row(model, position),
+        };
         let length = model.spacing.x;
         let transposed = trace.transposed(position.len());
         let drag = |node: usize| -> f64 {
@@ -139,13 +145,24 @@ impl CompliantBase {
     }
 }
 
+/// The printed trace: the outermost layer of nodes itself (Section 4.2).
+fn lowest_row(model: &Model, position: &[Vec2]) -> Csr<f64> {
+    let mut table = Csr::with_capacity(0, 0);
+    for node in lowest_nodes(model, position) {
+        table.push_row(&mut [(u32::try_from(node).unwrap_or(u32::MAX), 1.0)]);
+    }
+    table
+}
+
+/// Nodes of the lowest row.
+pub fn lowest_nodes(model: &Model, position: &[Vec2]) -> impl Iterator<Item = usize> {
+    let top = model.base_elevation + model.spacing.y;
+    position.iter().enumerate().filter(move |(_, x)| x.y < top).map(|(node, _)| node)
+}
+
 /// Points on the base below the nodes of the lowest row, m.
 pub fn base_points(model: &Model, position: &[Vec2]) -> Vec<Vec2> {
-    position
-        .iter()
-        .filter(|x| x.y - model.base_elevation < model.spacing.y)
-        .map(|x| Vec2::new(x.x, model.base_elevation))
-        .collect()
+    lowest_nodes(model, position).map(|node| Vec2::new(position[node].x, model.base_elevation)).collect()
 }
 
 #[cfg(test)]

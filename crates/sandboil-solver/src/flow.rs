@@ -259,3 +259,49 @@ fn surface_nodes(model: &Model) -> Vec<SurfaceNode> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        geometry::{Geometry, Wall},
+        model::Water,
+        skeleton::tests::square_block,
+    };
+    use sandboil_sph::Period;
+
+    /// Steady flow up through two layers whose conductivities differ a thousandfold: the head falls in each by
+    /// Darcy's law for the flux that is fed in below.
+    #[test]
+    fn a_contact_of_two_soils_passes_the_flux() {
+        const SIDE: usize = 20;
+        const CONTRAST: f64 = 1e3;
+        let mut model = square_block(SIDE);
+        model.period = Some(Period { width: SIDE as f64 });
+        model.base_elevation = -0.5;
+        model.surface_elevation = vec![SIDE as f64 - 0.5; model.nodes()];
+        model.water = Some(Water { unit_weight: 1.0, bulk_modulus: 1.0 });
+        model.pore_pressure = vec![0.0; model.nodes()];
+        model.regions.push(model.regions[0].clone());
+        for (region, conductivity) in model.regions.iter_mut().zip([1.0, 1.0 / CONTRAST]) {
+            region.hydraulic_conductivity = conductivity;
+        }
+        model.region = (0..model.nodes()).map(|node| u32::from(node >= model.nodes() / 2)).collect();
+        let volume = vec![1.0; model.nodes()];
+        let geometry = Geometry::build(&model, &model.position, &volume, Wall::TRACTION, None);
+        let diffusion = geometry.flow.unwrap().diffusion.unwrap();
+        // Storage so small that a step of one second is steady.
+        let stiffness = vec![1e12; model.nodes()];
+        let surface = surface_nodes(&model);
+        let mut head = vec![0.0; model.nodes()];
+        head[..SIDE].fill(1e12);
+        BandedLu::factor(&implicit_matrix(&diffusion, &surface, &stiffness, 1.0)).unwrap().solve(&mut head);
+        let fall = |from: usize, to: usize| (head[SIDE * from] - head[SIDE * to]) / (to - from) as f64;
+        let (below, above) = (fall(2, 7), fall(12, 17));
+        println!("gradients {below:.5} and {above:.3}, exact 1 and {CONTRAST}");
+        assert!((below - 1.0).abs() < 5e-3 && (above / CONTRAST - 1.0).abs() < 5e-3);
+        let exact = CONTRAST * (SIDE as f64 - 10.0) + (10.0 - 2.5);
+        // The contact lies where it should to a tenth of a spacing.
+        assert!((head[SIDE * 2] - exact).abs() < 0.1 * CONTRAST, "{} {exact}", head[SIDE * 2]);
+    }
+}

@@ -32,7 +32,7 @@ impl Parity {
     }
 }
 
-/// What the base does to the velocity field (4.1, 4.2 and the compliant base).
+/// What the base does to the velocity field: fixed in statics, a roller under the compliant base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wall {
     /// Tangential (x) component.
@@ -243,7 +243,13 @@ impl Geometry {
             .flow
             .as_ref()
             .map_or(0, |flow| flow.divergence.bytes() + flow.diffusion.as_ref().map_or(0, Csr::bytes));
-        self.gradient.bytes() + self.wall.bytes() + size_of_val(self.covariance.as_slice()) + flow
+        let printed = self.printed.as_ref().map_or(0, |tables| {
+            let values = [&tables.interpolation, &tables.ghost_stress, &tables.mirror_stress];
+            let vectors = [&tables.kernel_gradient, &tables.ghost_gradient, &tables.pressure_gradient];
+            values.map(Csr::bytes).iter().sum::<usize>() + vectors.map(Csr::bytes).iter().sum::<usize>()
+        });
+        let covariance = size_of_val(self.covariance.as_slice());
+        self.gradient.bytes() + self.wall.bytes() + covariance + flow + printed
     }
 }
 

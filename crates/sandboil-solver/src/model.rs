@@ -60,7 +60,7 @@ pub struct Water {
 pub enum Operators {
     /// Least-squares gradient at the stress nodes and its exact transpose as force.
     Conservative,
-    /// The paper's Eqs 5-13 with the corrections named in the theory page.
+    /// The paper's Eqs 6 and 8 to 11 with the corrections named in the theory page.
     Printed,
 }
 

@@ -93,3 +93,38 @@ impl Phases {
         4 * size_of_val(self.volume.as_slice())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::skeleton::tests::square_block;
+
+    #[test]
+    fn porosity_follows_the_volume_of_the_grains() {
+        let model = square_block(2);
+        let mut phases = Phases::new(&model);
+        let mut points = vec![StressPoint::default(); STRESS_NODES * model.nodes()];
+        let mass = phases.mass(0);
+        for point in &mut points[..STRESS_NODES] {
+            point.strain = [0.06, -0.16, 0.3];
+        }
+        assert_eq!(phases.follow(&points), 0);
+        // Eq. 1 integrated: (1 - n) V is constant, V = V_0 exp(volume strain).
+        assert!((phases.volume()[0] - (-0.1_f64).exp()).abs() < 1e-15);
+        assert!((1.0 - phases.porosity(0) - 0.5 * 0.1_f64.exp()).abs() < 1e-15);
+        assert!((phases.dry_density(0) * phases.volume()[0] - 1.0).abs() < 1e-15);
+        assert_eq!((phases.mass(0), phases.volume()[1]), (mass, 1.0));
+    }
+
+    #[test]
+    fn porosity_stays_that_of_a_packing() {
+        let model = square_block(2);
+        let mut phases = Phases::new(&model);
+        let mut points = vec![StressPoint::default(); STRESS_NODES * model.nodes()];
+        for point in &mut points {
+            point.strain = [-5.0, 0.0, 0.0];
+        }
+        assert_eq!(phases.follow(&points), model.nodes() as u64);
+        assert!((phases.porosity(0) - 0.05).abs() < 1e-14);
+    }
+}

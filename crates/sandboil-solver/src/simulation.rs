@@ -1,7 +1,7 @@
 //! Stages and stepping: the leapfrog loop, the gravity relaxation and the switch between them.
 
 use crate::{
-    base::{CompliantBase, UpgoingWave, base_points},
+    base::{CompliantBase, UpgoingWave, base_points, lowest_nodes},
     deformation::Deformation,
     error::SolverError,
     flow::{Flow, FlowScheme},
@@ -464,9 +464,7 @@ impl Simulation {
         }
         let stress_position = stress_node_positions(&self.position, self.model.spacing);
         let weights = point_weights(&self.model, &stress_position, &points);
-        let lowest = (0..self.model.nodes())
-            .filter(|&node| self.position[node].y - self.model.base_elevation < self.model.spacing.y);
-        lowest
+        lowest_nodes(&self.model, &self.position)
             .enumerate()
             .map(|(point, node)| {
                 let region = self.model.region[node] as usize;

@@ -2,7 +2,7 @@
 //! with twice the upgoing wave, delayed by the travel time.
 
 use crate::common::{column, elastic, shaking};
-use sandboil_solver::{Model, Shaking, Simulation, UpgoingWave};
+use sandboil_solver::{Model, Operators, Shaking, Simulation, UpgoingWave};
 use sandboil_sph::Vec2;
 use std::f64::consts::PI;
 
@@ -30,6 +30,7 @@ fn weightless(mut model: Model) -> Model {
 
 /// Velocity at the surface of a column under an upgoing wave: times and values.
 fn surface_velocity(
+    operators: Operators,
     spacing: f64,
     smoothing_ratio: f64,
     upgoing: impl Fn(f64) -> f64,
@@ -38,6 +39,7 @@ fn surface_velocity(
 ) -> (Vec<f64>, Vec<f64>) {
     let shear_modulus = DENSITY * SPEED * SPEED;
     let mut model = weightless(column(HEIGHT, spacing, 1, elastic(shear_modulus, 2.0 * shear_modulus), None));
+    model.numerics.operators = operators;
     model.numerics.smoothing_ratio = smoothing_ratio;
     let samples = (duration / INTERVAL) as usize;
     let velocity = (0..samples).map(|k| upgoing(k as f64 * INTERVAL)).collect();
@@ -53,49 +55,72 @@ fn surface_velocity(
     (times, values.chunks(channels.len()).map(|row| row[place]).collect())
 }
 
-fn surface_pulse(spacing: f64, smoothing_ratio: f64, frequency: f64) -> (Vec<f64>, Vec<f64>) {
-    surface_velocity(spacing, smoothing_ratio, |time| ricker(frequency, time - CENTRE), DURATION, |_| ())
+fn surface_pulse(
+    operators: Operators,
+    spacing: f64,
+    smoothing_ratio: f64,
+    frequency: f64,
+) -> (Vec<f64>, Vec<f64>) {
+    surface_velocity(
+        operators,
+        spacing,
+        smoothing_ratio,
+        |time| ricker(frequency, time - CENTRE),
+        DURATION,
+        |_| (),
+    )
 }
 
-/// Phase error of the least-squares operators, `1 - c_num/c = 5.3 (h / lambda)^2`, put through the spectrum of the
-/// pulse: the misfit that dispersion alone must leave. It is the whole of what is found, so base, surface and time
-/// stepping add nothing that can be seen.
+/// Phase error of the least-squares operators, `1 - c_num/c = 5.0 (h / lambda)^2`, put through the spectrum of the
+/// pulse: the misfit that dispersion alone must leave. It is nearly the whole of what is found, so base, surface and
+/// time stepping add next to nothing.
 fn dispersion_misfit(smoothing_length: f64, frequency: f64) -> f64 {
     // Root of the spectral mean of (f/f0)^6 for the spectrum f^2 exp(-(f/f0)^2).
     const SIXTH_MOMENT_ROOT: f64 = 2.218;
-    let delay = 5.3 * (smoothing_length * frequency / SPEED).powi(2) * HEIGHT / SPEED;
+    let delay = 5.0 * (smoothing_length * frequency / SPEED).powi(2) * HEIGHT / SPEED;
     2.0 * PI * frequency * delay * SIXTH_MOMENT_ROOT
+}
+
+/// Largest value of a signal, by the parabola through its largest sample and the two beside it.
+fn summit(signal: &[f64]) -> f64 {
+    let at = (1..signal.len() - 1).max_by(|&a, &b| signal[a].total_cmp(&signal[b])).unwrap();
+    let [before, top, after] = [signal[at - 1], signal[at], signal[at + 1]];
+    top - 0.125 * (after - before).powi(2) / (after - 2.0 * top + before)
 }
 
 #[test]
 fn ricker_pulse_on_a_compliant_base() {
-    for (spacing, ratio, peaks) in [
-        (0.2, 1.4, [(2.0, 5e-4), (5.0, 3e-3), (10.0, 1.6e-2)]),
-        (0.2, 1.2, [(2.0, 5e-4), (5.0, 2e-3), (10.0, 1e-2)]),
-        (0.4, 1.4, [(2.0, 2e-3), (5.0, 1.4e-2), (10.0, 0.12)]),
+    use Operators::{Conservative, Printed};
+    for (operators, spacing, ratio, peaks) in [
+        (Conservative, 0.2, 1.4, [(2.0, 5e-4), (5.0, 3e-3), (10.0, 1.6e-2)]),
+        (Conservative, 0.2, 1.2, [(2.0, 5e-4), (5.0, 2e-3), (10.0, 1e-2)]),
+        (Printed, 0.2, 1.4, [(2.0, 0.03), (5.0, 0.03), (10.0, 0.03)]),
+        (Conservative, 0.4, 1.4, [(2.0, 2e-3), (5.0, 1.4e-2), (10.0, 0.12)]),
     ] {
         for (frequency, bound) in peaks {
-            let (times, found) = surface_pulse(spacing, ratio, frequency);
+            let (times, found) = surface_pulse(operators, spacing, ratio, frequency);
             let exact: Vec<f64> =
                 times.iter().map(|t| 2.0 * ricker(frequency, t - CENTRE - HEIGHT / SPEED)).collect();
             let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
-            let peak = found.iter().copied().fold(0.0, f64::max) / 2.0 - 1.0;
+            let peak = summit(&found) / 2.0 - 1.0;
             let misfit =
                 norm(&mut found.iter().zip(&exact).map(|(f, e)| f - e)) / norm(&mut exact.iter().copied());
+            // The base row of the printed set takes 2.5 % of every wave.
+            let beside = if operators == Printed { 0.04 } else { 3e-3 };
             let expected = dispersion_misfit(spacing * ratio, frequency);
             // What comes after the pulse has left: the reflection of the base.
             let gone = CENTRE + HEIGHT / SPEED + 1.5 / frequency.min(5.0) + 0.2;
             let late = times.iter().zip(&found).filter(|(t, _)| **t > gone);
             let late = late.map(|(_, v)| v.abs()).fold(0.0, f64::max) / 2.0;
             println!(
-                "dx {spacing} h/dx {ratio} {frequency:4.1} Hz: peak {:+.2} %, L2 {:.2} % (dispersion {:.2} %), late {:.2} %",
+                "{operators:?} dx {spacing} h/dx {ratio} {frequency:4.1} Hz: peak {:+.2} %, L2 {:.2} % (dispersion {:.2} %), late {:.2} %",
                 100.0 * peak,
                 100.0 * misfit,
                 100.0 * expected,
                 100.0 * late
             );
             assert!(peak.abs() <= bound, "peak {peak}");
-            assert!(misfit <= 1.15 * expected + 3e-3, "misfit {misfit}, dispersion {expected}");
+            assert!(misfit <= 1.15 * expected + beside, "misfit {misfit}, dispersion {expected}");
             assert!(late <= 0.02, "late {late}");
         }
     }
@@ -105,7 +130,7 @@ fn ricker_pulse_on_a_compliant_base() {
 #[test]
 fn transfer_function_of_the_matched_column_is_one() {
     for (ratio, bound) in [(1.4, 0.012), (1.2, 0.007)] {
-        let (times, found) = surface_pulse(0.2, ratio, 5.0);
+        let (times, found) = surface_pulse(Operators::Conservative, 0.2, ratio, 5.0);
         let amplitude = |frequency: f64, value: &dyn Fn(usize) -> f64| {
             let (mut re, mut im) = (0.0, 0.0);
             for (k, time) in times.iter().enumerate() {
@@ -138,10 +163,11 @@ fn damping_ratio(local_damping: f64) -> f64 {
         let envelope = if time < driven { (PI * time / driven).sin().powi(2) } else { 0.0 };
         SMALL * envelope * (2.0 * PI * time / period).sin()
     };
-    let (times, velocity) = surface_velocity(0.4, 1.4, push, driven + 8.0 * period, |stage| {
-        stage.half_space = Some((1e6 * SPEED, DENSITY));
-        stage.local_damping = local_damping;
-    });
+    let (times, velocity) =
+        surface_velocity(Operators::Conservative, 0.4, 1.4, push, driven + 8.0 * period, |stage| {
+            stage.half_space = Some((1e6 * SPEED, DENSITY));
+            stage.local_damping = local_damping;
+        });
     let amplitude = |cycle: f64| {
         let from = driven + cycle * period;
         let (mut re, mut im) = (0.0, 0.0);
@@ -168,6 +194,6 @@ fn local_damping_is_a_ratio_of_xi_over_pi() {
         100.0 * with,
         100.0 * XI / PI
     );
-    assert!(without < 2e-4, "{without}");
+    assert!(without < 5e-4, "{without}");
     assert!(((with - without) * PI / XI - 1.0).abs() < 0.05, "{with}");
 }
