@@ -35,6 +35,14 @@ def measured(motion: sb.Motion, folder: Path, **changes: object) -> Figures:
     return figures
 
 
+def test_the_base_has_the_impedance_of_its_sand() -> None:
+    """rho Cs of layer 3 at the base's stress, as the reference's dashpot has it: 475.3 kPa s/m."""
+    simulation = sb.Simulation(level_ground.scene(None), threads=1)
+    simulation.run_stage()
+    simulation.begin_next_stage()
+    assert simulation.base_impedance == pytest.approx(475.3, rel=0.005)
+
+
 def test_surface_peak_below_10_hz_is_within_ten_per_cent(found: Figures) -> None:
     assert found.pga_10hz_g == pytest.approx(PGA, rel=0.1)
 

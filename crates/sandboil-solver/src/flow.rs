@@ -304,4 +304,25 @@ mod tests {
         // The contact lies where it should to a tenth of a spacing.
         assert!((head[SIDE * 2] - exact).abs() < 0.1 * CONTRAST, "{} {exact}", head[SIDE * 2]);
     }
+
+    /// Acceleration that spreads draws water apart: `dp/dt = (K_f/n) (k/g) div a`, where k is uniform.
+    #[test]
+    fn spreading_acceleration_raises_the_pressure() {
+        const CONDUCTIVITY: f64 = 0.3;
+        let mut model = square_block(9);
+        model.surface_elevation = vec![1e3; model.nodes()];
+        model.water = Some(Water { unit_weight: 10.0, bulk_modulus: 8.0 });
+        model.regions[0].hydraulic_conductivity = CONDUCTIVITY;
+        let volume = vec![1.0; model.nodes()];
+        let geometry = Geometry::build(&model, &model.position, &volume, Wall::TRACTION, None);
+        let mut flow = Flow::new(&model, &Phases::new(&model), FlowScheme::ExplicitWithAcceleration).unwrap();
+        let acceleration: Vec<Vec2> =
+            model.position.iter().map(|x| Vec2::new(0.2 * x.x, 0.5 * x.y)).collect();
+        let still = vec![Vec2::zeros(); model.nodes()];
+        let points = vec![StressPoint::default(); STRESS_NODES * model.nodes()];
+        let dt = 1e-3;
+        assert!(flow.step(false, &geometry.flow.unwrap(), &points, &still, &acceleration, dt));
+        let expected = dt * (8.0 / 0.5) * CONDUCTIVITY / model.gravity * 0.7;
+        assert!((flow.excess[40] - expected).abs() < 1e-12, "{} {expected}", flow.excess[40]);
+    }
 }

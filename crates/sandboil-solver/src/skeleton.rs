@@ -279,6 +279,73 @@ pub(crate) mod tests {
         prop::collection::vec((-range..range, -range..range), count)
     }
 
+    /// Nodes that move with `dx/dt = A X` strain the soil by `A F^-1`: less and less as it grows longer.
+    #[test]
+    fn strain_is_taken_in_the_deformed_frame() {
+        const STEPS: u32 = 200;
+        let model = square_block(6);
+        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], Wall::NO_SLIP, None);
+        let velocity: Vec<Vec2> = model.position.iter().map(|x| Vec2::new(0.3 * x.x, 0.0)).collect();
+        let mut deformation = Deformation::default();
+        let strain: f64 = (0..STEPS)
+            .map(|_| motion(&geometry, 30, &velocity).advance(&mut deformation, 1.0 / f64::from(STEPS)).xx)
+            .sum();
+        assert!((deformation.xx - 1.3).abs() < 1e-12 && (strain - 1.3_f64.ln()).abs() < 1e-6, "{strain}");
+    }
+
+    /// Simple shear to the right turns the soil clockwise: engineering shear and positive spin.
+    #[test]
+    fn shear_has_its_spin() {
+        let model = square_block(6);
+        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], Wall::NO_SLIP, None);
+        let velocity: Vec<Vec2> = model.position.iter().map(|x| Vec2::new(0.2 * x.y, 0.0)).collect();
+        let rate = motion(&geometry, 30, &velocity).increment(&Deformation::default(), 1.0);
+        let expected = StrainIncrement { xx: 0.0, yy: 0.0, xy: 0.2, spin: 0.1 };
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-13;
+        assert!(close(rate.xx, expected.xx) && close(rate.yy, expected.yy), "{rate:?}");
+        assert!(close(rate.xy, expected.xy) && close(rate.spin, expected.spin), "{rate:?}");
+    }
+
+    /// Eq. 6 term by term, with masses and densities as it prints them, where two soils meet.
+    #[test]
+    fn printed_force_is_equation_6() {
+        const SIDE: usize = 6;
+        let mut model = square_block(SIDE);
+        model.numerics.operators = Operators::Printed;
+        model.regions.push(Region { porosity: 0.2, ..model.regions[0].clone() });
+        model.region = (0..model.nodes()).map(|node| u32::from(node >= 18)).collect();
+        let phases = Phases::new(&model);
+        let geometry = Geometry::build(&model, &model.position, phases.volume(), Wall::NO_SLIP, None);
+        let points: Vec<StressPoint> = (0..STRESS_NODES * model.nodes())
+            .map(|s| StressPoint {
+                stress: Stress { xx: s as f64, yy: 2.0 * s as f64, xy: -0.5 * s as f64, zz: 0.0 },
+                ..StressPoint::default()
+            })
+            .collect();
+        let tables = geometry.printed.as_ref().unwrap();
+        let mut stress = PrintedStress::default();
+        stress.update(tables, &points, false);
+        let i = 14;
+        let own = tables.interpolation.iter_row(i).fold([0.0; 3], |sum, (s, w)| {
+            let Stress { xx, yy, xy, .. } = points[s].stress;
+            [sum[0] + w * xx, sum[1] + w * yy, sum[2] + w * xy]
+        });
+        let rho_i = phases.dry_density(i);
+        let mut expected = Vec2::zeros();
+        for (s, v_grad_w) in tables.kernel_gradient.iter_row(i) {
+            let rho_j = phases.dry_density(s / STRESS_NODES);
+            // The table holds V_j grad W; m_j = rho_j V_j.
+            let m_grad_w = v_grad_w * rho_j;
+            let Stress { xx, yy, xy, .. } = points[s].stress;
+            let sum = |own: f64, other: f64| own / (rho_i * rho_i) + other / (rho_j * rho_j);
+            let (xx, yy, xy) = (sum(own[0], xx), sum(own[1], yy), sum(own[2], xy));
+            expected += Vec2::new(xx * m_grad_w.x + xy * m_grad_w.y, xy * m_grad_w.x + yy * m_grad_w.y);
+        }
+        expected *= rho_i * phases.volume()[i];
+        let found = stress.force(tables, i, &points, &phases);
+        assert!((found - expected).norm() < 1e-12 * expected.norm(), "{found} {expected}");
+    }
+
     proptest! {
         #[test]
         fn force_is_the_transpose_of_strain_and_conserves_momentum(

@@ -237,6 +237,44 @@ fn the_printed_form_has_growing_modes() {
     assert!((1e-3..5e-2).contains(&rate), "{rate}");
 }
 
+/// Damping matrix of the velocity filter on a block without stress, per unit mass: `-M^-1 dF/dv`.
+fn filter_matrix(model: &Model, strength: f64, shear_modulus: f64) -> DMatrix<f64> {
+    let nodes = model.nodes();
+    let volume = vec![1.0; nodes];
+    let geometry = Geometry::build(model, &model.position, &volume, Wall::NO_SLIP, None);
+    let point = StressPoint { density: 1.0, volume: 0.5, shear_modulus, ..StressPoint::default() };
+    let points = vec![point; STRESS_NODES * nodes];
+    let mut matrix = DMatrix::zeros(2 * nodes, 2 * nodes);
+    for column in 0..2 * nodes {
+        let mut velocity = vec![Vec2::zeros(); nodes];
+        velocity[column / 2][column % 2] = 1.0;
+        let shares: Vec<_> = (0..points.len())
+            .map(|s| motion(&geometry, s, &velocity).share(&points[s], geometry.covariance[s], strength))
+            .collect();
+        for j in 0..nodes {
+            let force = conservative_force(&geometry, j, velocity[j], &shares, &points);
+            matrix[(2 * j, column)] = -force.x;
+            matrix[(2 * j + 1, column)] = -force.y;
+        }
+    }
+    matrix
+}
+
+/// The filter is as strong as the time step reckons with, symmetric, and grows with the current shear-wave speed,
+/// down to 20 m/s.
+#[test]
+fn strength_of_the_velocity_filter() {
+    let model = square_block(10);
+    for (shear_modulus, speed) in [(1e4, 100.0), (1.0, 20.0), (0.0, 20.0)] {
+        let matrix = filter_matrix(&model, 0.1, shear_modulus);
+        assert!((&matrix - matrix.transpose()).amax() < 1e-14 * speed);
+        let eigenvalues = matrix.symmetric_eigenvalues();
+        let largest = eigenvalues.max() / (0.1 * speed);
+        println!("C_s {speed} m/s: eigenvalues of the filter up to {largest:.3} xi C_s/dx");
+        assert!((largest - 1.05).abs() < 0.02 && eigenvalues.min() > -1e-12 * speed, "{largest}");
+    }
+}
+
 #[test]
 fn stress_nodes_lie_a_third_of_a_spacing_from_their_velocity_node() {
     assert!((stress_node_offset(Vec2::repeat(0.3)).norm() - 0.1).abs() < 1e-15);
