@@ -56,7 +56,7 @@ def test_the_page_tells_what_is_on_and_why() -> None:
         "ms a step in a trial of",
         "memory",
         "pore pressure coefficient B",
-        "standard; how much error each preset saves or costs is not measured yet",
+        "standard; what presets save and cost is measured on the level ground",
     ):
         assert told in text
 

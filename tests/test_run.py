@@ -76,7 +76,7 @@ def test_the_ground_at_rest_has_its_geostatic_state() -> None:
     # Two rows at either end carry the boundaries' own error.
     inner = slice(4, -4)
     vertical = particles.sigma_v_eff0[inner]
-    for name, share in (("sigma_v_eff", 1.0), ("sigma_h_eff", 0.5), ("p_eff", 2.0 / 3.0)):
+    for name, share in (("sigma_v_eff", 1.0), ("sigma_h_eff", 0.5), ("p_eff", 0.75)):
         np.testing.assert_allclose(simulation.field(name)[inner], share * vertical, rtol=0.04)
     np.testing.assert_allclose(simulation.field("r_u_stress")[inner], 0.0, atol=0.04)
     np.testing.assert_array_equal(simulation.field("pore_pressure"), particles.pore_pressure0)
@@ -199,8 +199,11 @@ def test_accuracy_fills_only_what_the_scene_leaves_open(tmp_path: Path) -> None:
     open_scene = scenes.column()
     assert with_accuracy(open_scene, "standard") == open_scene
     assert with_accuracy(open_scene, "draft").numerics.integrator_tolerance == 1.0e-4
+    assert with_accuracy(open_scene, "draft").numerics.time_step_factor == 0.9
     assert with_accuracy(open_scene, "reference").numerics.diffusion == "explicit"
-    said = scenes.column(numerics=Numerics(integrator_tolerance=3.0e-5, diffusion="implicit"))
+    said = scenes.column(
+        numerics=Numerics(integrator_tolerance=3.0e-5, time_step_factor=0.5, diffusion="implicit")
+    )
     for accuracy in ("draft", "standard", "reference"):
         assert with_accuracy(said, accuracy) == said
     with pytest.raises(InvalidInput, match="did you mean 'draft'"):

@@ -111,7 +111,8 @@ class Plan:
             ]
         lines += [
             "",
-            f"accuracy      {self.accuracy}; how much error each preset saves or costs is not measured yet",
+            f"accuracy      {self.accuracy}; what presets save and cost is measured on the level ground,",
+            "              see docs/validation.md",
         ]
         return "\n".join(lines)
 

@@ -40,7 +40,9 @@ FIELDS: dict[str, Quantity] = {
     "r_u_stress": Quantity("1", "one minus vertical effective stress over its geostatic value"),
     "sigma_v_eff": Quantity("kPa", "vertical effective stress, compression positive"),
     "sigma_h_eff": Quantity("kPa", "horizontal effective stress, compression positive"),
-    "p_eff": Quantity("kPa", "mean (sigma_v_eff + sigma_h_eff)/2 in the plane, as in PM4Sand, compression positive"),
+    "p_eff": Quantity(
+        "kPa", "mean (sigma_v_eff + sigma_h_eff)/2 in the plane, as in PM4Sand, compression positive"
+    ),
     "tau_xy": Quantity("kPa", "shear stress, positive with a positive gamma_xy"),
     "gamma_xy": Quantity("1", "engineering shear strain since the stage began"),
     "gamma_max": Quantity("1", "largest engineering shear strain in the plane since the stage began"),
