@@ -14,6 +14,7 @@ import tomli_w
 from sandboil._errors import InvalidInput, SandboilError, SimulationDiverged, nearest_name
 from sandboil.materials import Elastic, PM4Sand
 from sandboil.scene import Box, Gravity, Region, Scene, Shaking, box, polygon
+from sandboil.simulation import Simulation
 
 SOUND: dict[str, Any] = {
     "spacing": 0.5,
@@ -260,6 +261,69 @@ CASES: dict[str, tuple[Change, str, object, str, str | None]] = {
         None,
     ),
     "spacing zero": (setting("spacing", 0.0), "scene.spacing", 0.0, "must be greater than 0", None),
+    "spacing in millimetres": (
+        setting("spacing", 1.0e-4),
+        "scene.spacing",
+        1.0e-4,
+        "at most 1e+07 cells",
+        "increase it",
+    ),
+    "coordinates beyond any section": (
+        setting("regions.1.shape.x", [0.0, 1.0e300]),
+        "scene.spacing",
+        0.5,
+        "at most 1e+07 cells",
+        "unit of the coordinates",
+    ),
+    "yield surface beyond the core's range": (
+        setting("regions.0.material.m", 5.0),
+        "scene.regions[0].material.m",
+        5.0,
+        "must be",
+        None,
+    ),
+    "void ratio of no soil": (
+        setting("regions.0.material.e_max", 1.0e9),
+        "scene.regions[0].material.e_max",
+        1.0e9,
+        "must lie in (0, 10]",
+        None,
+    ),
+    "depth named twice": (
+        setting("output.depths", [4.0, 4.0]),
+        "scene.output.depths[1]",
+        4.0,
+        "named twice",
+        None,
+    ),
+    "a frame every nanosecond": (
+        setting("output.field_dt", 1.0e-9),
+        "scene.output.field_dt",
+        1.0e-9,
+        "at most 100000 frames",
+        "0.0001 s",
+    ),
+    "tolerance without error control": (
+        setting("numerics", {"integrator": "rk4", "integrator_tolerance": 1.0e-5}),
+        "scene.numerics.integrator_tolerance",
+        1.0e-5,
+        "no effect",
+        "default",
+    ),
+    "acceleration term that implicit diffusion drops": (
+        setting("numerics", {"diffusion": "implicit", "acceleration_term": "on"}),
+        "scene.numerics.acceleration_term",
+        "on",
+        "left out",
+        "explicit",
+    ),
+    "filter that the printed operators have not": (
+        setting("numerics", {"operators": "printed", "velocity_filter": 0.1}),
+        "scene.numerics.velocity_filter",
+        0.1,
+        "no effect",
+        "conservative",
+    ),
     "misspelt material": (
         setting(f"{SAND}.kind", "pm4snd"),
         "scene.regions[0].material.kind",
@@ -552,15 +616,38 @@ def test_unreadable_files_are_refused(tmp_path: Path) -> None:
         scene.to_toml(tmp_path / "no" / "such" / "folder.toml")
 
 
+def test_a_byte_order_mark_is_no_slip(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(tomli_w.dumps(SOUND), encoding="utf-8-sig")
+    assert Scene.from_toml(path) == Scene(**SOUND)
+
+
+def test_a_bad_motion_is_told_with_its_stage(tmp_path: Path) -> None:
+    """A motion is read before anything is computed, and its own path follows that of its stage."""
+    within = {"kind": "within", "dt": 0.01, "velocity": [0.0, 0.1, 0.0]}
+    lost = {"file": str(tmp_path / "none.AT2")}
+    for motion, path in ((within, "scene.stages[1].motion.kind"), (lost, "scene.stages[1].motion file")):
+        scene = Scene(**(SOUND | {"stages": [{"kind": "gravity"}, {"kind": "shaking", "motion": motion}]}))
+        with pytest.raises(InvalidInput) as refused:
+            Simulation(scene, threads=1)
+        assert refused.value.path.startswith(path)
+
+
+def test_threads_are_bounded() -> None:
+    for threads in (0, 257, True, 2.0):
+        with pytest.raises(InvalidInput, match="whole number from 1 to 256"):
+            Simulation(Scene(**SOUND), threads=threads)
+
+
 def test_errors_survive_pickling_and_say_what_they_hold() -> None:
     refused = InvalidInput("scene.spacing", -1.0, "must be greater than 0", "in m")
     again = pickle.loads(pickle.dumps(refused))
     assert str(again) == "scene.spacing = -1.0: must be greater than 0; in m"
     assert isinstance(refused, ValueError)
-    diverged = SimulationDiverged("velocity", 7, (0.5, 19.9), 1.25, 4000)
+    diverged = SimulationDiverged("velocity", 7, (0.5, 19.9), 1.5e3, 1.25, 4000)
     assert isinstance(diverged, SandboilError)
     assert str(pickle.loads(pickle.dumps(diverged))) == (
-        "the run diverged: velocity of node 7 at (0.5, 19.9) m, time 1.25 s, step 4000"
+        "the run diverged: velocity of node 7 at (0.5, 19.9) m is 1.5e+03, time 1.25 s, step 4000"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import pickle
 import time
 from collections.abc import Callable
@@ -17,11 +18,10 @@ from sandboil._errors import InvalidInput
 from sandboil.motion import Motion, response_spectrum
 
 G = 9.81
-SHARED = Path(__file__).resolve().parents[2] / "shared" / "motions"
-RECORD = SHARED / "RSN765_LOMAP_G01090.AT2"
+RECORD = Path(os.environ.get("SANDBOIL_RECORDS", "")) / "RSN765_LOMAP_G01090.AT2"
 
 needs_record = pytest.mark.skipif(
-    not RECORD.exists(), reason="the record's folder ../shared/motions is absent: it is not redistributed"
+    not RECORD.exists(), reason=f"needs {RECORD.name}, which may not be distributed, in SANDBOIL_RECORDS"
 )
 
 VALUES = [0.01, -0.02, 0.03, 0.0, -0.01, 0.005, 0.25]
@@ -235,7 +235,7 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Motion], list[str]]] = {
     "csv empty": (bad_csv("", unit="g"), ["m.csv, line 1 = ''", "header row"]),
     "csv zero points": (bad_csv("t,a\n", unit="g"), ["m.csv, number of points = 0", "at least 2"]),
     "csv unit unsaid": (bad_csv("t,a\n0,0.1\n0.01,0.1\n"), ["m.csv, unit = None", 'unit="g"', '"a_g"']),
-    "csv unit unknown": (bad_csv("t,a\n", unit="m/s^2"), ["unit = 'm/s^2'", 'did you mean "m/s2"?']),
+    "csv unit unknown": (bad_csv("t,a\n", unit="cm/s3"), ["unit = 'cm/s3'", 'did you mean "cm/s2"?']),
     "csv unit contradicts": (bad_csv("t,acc_g\n0,0\n", unit="m/s2"), ["m.csv, unit = 'm/s2'", "acc_g"]),
     "csv velocity in cm": (bad_csv("t,vel_cm_s\n0,0\n", unit="m/s"), ["m.csv, unit = 'cm_s'", "convert"]),
     "csv column unknown": (
@@ -314,7 +314,7 @@ BAD_ARGUMENTS: dict[str, tuple[Callable[[], object], list[str]]] = {
     "table": (lambda: Motion(dt=0.01, acceleration_g=[[0.0], [1.0]]), ["one-dimensional"]),
     "words": (lambda: Motion(dt=0.01, acceleration_g=["a", "b"]), ["array of numbers"]),
     "over 20 g": (lambda: Motion(dt=0.01, acceleration_g=[0.0, -21.0]), ["[1] = -21.0", "20 g", "unit"]),
-    "over 20 m/s": (lambda: Motion(dt=9.0, velocity=[0.0, 21.0]), ["motion.velocity[1] = 21.0", "cm/s"]),
+    "over 20 m/s": (lambda: Motion(dt=0.5, velocity=[0.0, 21.0]), ["motion.velocity[1] = 21.0", "cm/s"]),
     "steep velocity": (
         lambda: Motion(dt=0.001, velocity=[0.0, 0.0, 1.0]),
         ["motion.velocity[2]", "differentiated"],
@@ -327,7 +327,7 @@ BAD_ARGUMENTS: dict[str, tuple[Callable[[], object], list[str]]] = {
     ),
     "within": (
         lambda: Motion(dt=0.01, acceleration_g=QUIET, kind="within").upgoing_velocity(),
-        ["motion.kind = 'within'", "downgoing", "deconvolve"],
+        ["motion.kind = 'within'", "downgoing", "outcrop motion of the same rock"],
     ),
     "scaled by nothing": (lambda: sine().scaled(), ["exactly one"]),
     "scaled by both": (lambda: sine().scaled(pga_g=1.0, factor=1.0), ["exactly one"]),
@@ -628,7 +628,13 @@ def test_synthetic_depends_on_its_seed_alone() -> None:
 )
 @settings(max_examples=20, deadline=None)
 def test_synthetic_meets_its_targets(seed: int, pga_g: float, ratio: float, duration: float) -> None:
-    motion = Motion.synthetic(pga_g, duration, seed, pgv=ratio * pga_g * G)
+    """Met exactly, or refused with the span that this seed's noise can be brought to."""
+    try:
+        motion = Motion.synthetic(pga_g, duration, seed, pgv=ratio * pga_g * G)
+    except InvalidInput as refused:
+        least, most = (float(word) for word in refused.allowed.split() if word.replace(".", "").isdigit())
+        assert not least < ratio * pga_g * G < most
+        return
     assert motion.pga_g == pytest.approx(pga_g, rel=1e-12)
     assert motion.pgv == pytest.approx(ratio * pga_g * G, rel=1e-3)
     assert motion.d5_95 == pytest.approx(3.68 / 12.0 * duration, rel=0.4)
@@ -648,7 +654,7 @@ def test_synthetic_ground_frequency_and_duration_are_obeyed() -> None:
 @needs_record
 def test_record_reads_and_integrates_to_the_velocity_distributed_with_it() -> None:
     motion = Motion.from_at2(RECORD)
-    other = Motion.from_csv(SHARED / "loma_prieta_gilroy1.csv", unit="m/s")
+    other = Motion.from_csv(RECORD.parent / "loma_prieta_gilroy1.csv", unit="m/s")
     assert (motion.acceleration_g.size, motion.dt) == (7990, 0.005)
     assert motion.source == {"file": str(RECORD), "kind": "outcrop"}
     assert np.sqrt(np.mean((motion.velocity - other.velocity) ** 2)) < 1e-9
@@ -661,8 +667,8 @@ def test_record_reads_and_integrates_to_the_velocity_distributed_with_it() -> No
 
 @needs_record
 def test_record_of_the_older_header_form() -> None:
-    motion = Motion.from_at2(SHARED / "pacoima_dam_1971_pul164.AT2")
-    other = Motion.from_csv(SHARED / "pacoima_dam_1971_pul164.csv")
+    motion = Motion.from_at2(RECORD.parent / "pacoima_dam_1971_pul164.AT2")
+    other = Motion.from_csv(RECORD.parent / "pacoima_dam_1971_pul164.csv")
     assert (motion.acceleration_g.size, motion.dt) == (4164, 0.01)
     assert motion.pga_g == pytest.approx(1.22591)
     np.testing.assert_allclose(motion.acceleration_g, other.acceleration_g, atol=1e-7)
@@ -670,7 +676,7 @@ def test_record_of_the_older_header_form() -> None:
 
 @needs_record
 def test_spectrum_of_the_record_is_the_reference_one() -> None:
-    path = SHARED.parent / "reference" / "level_ground" / "spectrum.csv"
+    path = Path(__file__).parent / "validation" / "data" / "level_ground" / "spectrum.csv"
     reference = np.loadtxt(path, delimiter=",", skiprows=1)
     spectrum = Motion.from_at2(RECORD).response_spectrum(periods=reference[:, 0])
     np.testing.assert_allclose(spectrum.psa_g, reference[:, 2], rtol=3e-6)

@@ -42,6 +42,7 @@ class SimulationDiverged(SandboilError):
     Attributes
     ----------
     quantity : name of the field that is no longer finite or bounded
+    value : what it was
     node : index of the first offending node
     position : its (x, y) in m
     time : time in the stage, s
@@ -49,10 +50,17 @@ class SimulationDiverged(SandboilError):
     """
 
     def __init__(
-        self, quantity: str, node: int, position: tuple[float, float], time: float, step: int
+        self,
+        quantity: str,
+        node: int,
+        position: tuple[float, float],
+        value: float,
+        time: float,
+        step: int,
     ) -> None:
-        super().__init__(quantity, node, position, time, step)
+        super().__init__(quantity, node, position, value, time, step)
         self.quantity = quantity
+        self.value = value
         self.node = node
         self.position = position
         self.time = time
@@ -61,8 +69,8 @@ class SimulationDiverged(SandboilError):
     def __str__(self) -> str:
         x, y = self.position
         return (
-            f"the run diverged: {self.quantity} of node {self.node} at ({x:.6g}, {y:.6g}) m, "
-            f"time {self.time:.6g} s, step {self.step}"
+            f"the run diverged: {self.quantity} of node {self.node} at ({x:.6g}, {y:.6g}) m is "
+            f"{self.value:.3g}, time {self.time:.6g} s, step {self.step}"
         )
 
 

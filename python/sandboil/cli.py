@@ -37,6 +37,9 @@ MotionOption = Annotated[
 UnitOption = Annotated[
     str | None, typer.Option(help="Unit of a CSV's values: g, m/s2, cm/s2 or m/s, unless its header says it.")
 ]
+RunKindOption = Annotated[
+    Kind | None, typer.Option("--kind", help="Where the --motion is one of; default outcrop.")
+]
 ColumnOption = Annotated[str | None, typer.Option(help="Column of a CSV, by its name.")]
 ThreadsOption = Annotated[int, typer.Option(help="Threads; the results do not depend on their number.")]
 AccuracyOption = Annotated[Accuracy, typer.Option(help="Fills the numerics that the scene leaves open.")]
@@ -44,11 +47,11 @@ MotionFile = Annotated[Path, typer.Argument(help="Record: PEER .AT2, or CSV with
 KindOption = Annotated[Kind, typer.Option(help="Where the motion is one of.")]
 
 
-def _scene(path: Path, motion: Path | None, unit: str | None, column: str | None) -> Scene:
+def _scene(path: Path, motion: Path | None, unit: str | None, column: str | None, kind: Kind | None) -> Scene:
     scene = Scene.from_toml(path)
     if motion is not None:
-        return scene.with_motion(Motion.from_file(motion, unit=unit, column=column))
-    for name, value in (("--unit", unit), ("--column", column)):
+        return scene.with_motion(Motion.from_file(motion, unit=unit, column=column, kind=kind or "outcrop"))
+    for name, value in (("--unit", unit), ("--column", column), ("--kind", kind)):
         if value is not None:
             raise InvalidInput(name, value, "belongs to a --motion", "name the record, or leave it out")
     return scene
@@ -60,11 +63,12 @@ def plan(
     motion: MotionOption = None,
     unit: UnitOption = None,
     column: ColumnOption = None,
+    kind: RunKindOption = None,
     accuracy: AccuracyOption = "standard",
     threads: ThreadsOption = 2,
 ) -> None:
     """Tell what a run would compute and cost, from a trial of some seconds. Writes nothing."""
-    typer.echo(str(plan_of(_scene(scene, motion, unit, column), threads, accuracy)))
+    typer.echo(str(plan_of(_scene(scene, motion, unit, column, kind), threads, accuracy)))
 
 
 @app.command()
@@ -74,12 +78,15 @@ def run(
     motion: MotionOption = None,
     unit: UnitOption = None,
     column: ColumnOption = None,
+    kind: RunKindOption = None,
     accuracy: AccuracyOption = "standard",
     threads: ThreadsOption = 2,
 ) -> None:
     """Compute a scene. Ctrl-C ends it with readable results."""
     try:
-        results = run_scene(_scene(scene, motion, unit, column), out, threads=threads, accuracy=accuracy)
+        results = run_scene(
+            _scene(scene, motion, unit, column, kind), out, threads=threads, accuracy=accuracy
+        )
     except InvalidInput:
         raise
     except SandboilError as error:
@@ -133,10 +140,11 @@ def spectrum(
     file: MotionFile,
     unit: UnitOption = None,
     column: ColumnOption = None,
+    kind: KindOption = "outcrop",
     damping: Annotated[float, typer.Option(help="Fraction of critical.")] = 0.05,
 ) -> None:
     """Print the pseudo-acceleration response spectrum as CSV."""
-    response = Motion.from_file(file, unit=unit, column=column).response_spectrum(damping)
+    response = Motion.from_file(file, unit=unit, column=column, kind=kind).response_spectrum(damping)
     typer.echo("period_s,psa_g")
     for period, psa in zip(response.periods, response.psa_g, strict=True):
         typer.echo(f"{period:.6g},{psa:.6g}")
@@ -168,6 +176,8 @@ def main() -> None:
     """Run the command line and exit with its code."""
     try:
         app()
+    except KeyboardInterrupt:
+        sys.exit(EXIT_INTERRUPTED)
     except SandboilError as error:
         typer.echo(f"sandboil: {error}", err=True)
         for note in getattr(error, "__notes__", ()):

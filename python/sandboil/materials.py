@@ -15,6 +15,8 @@ _NU: JsonDict = {
     "remedy": "nu = 0.5 is incompressible; undrained response comes from the pore water: "
     "keep the drained nu and give the region no hydraulic_conductivity"
 }
+# Largest void ratio of any soil that carries load; above it the entry is a slip of units.
+_VOID_RATIO_MAX = 10.0
 # Largest critical-state friction angle of any sand, degrees; above it the entry is a slip of units.
 _PHI_CV_MAX = 50.0
 
@@ -45,7 +47,9 @@ class PM4Sand(Model):
     hpo: Number = Field(gt=0.0, description="contraction rate")
     p_atm: Positive | None = Field(default=None, description="atmospheric pressure, kPa; default 101.3")
     ho: Positive | None = Field(default=None, description="ratio of plastic to elastic modulus")
-    e_max: Positive | None = Field(default=None, description="largest void ratio; default 0.8")
+    e_max: Annotated[Number, Field(gt=0.0, le=_VOID_RATIO_MAX)] | None = Field(
+        default=None, description="largest void ratio; default 0.8"
+    )
     e_min: Positive | None = Field(default=None, description="smallest void ratio; default 0.5")
     nb: NonNegative | None = Field(default=None, description="bounding surface exponent; default 0.5")
     nd: NonNegative | None = Field(default=None, description="dilatancy surface exponent; default 0.1")
@@ -107,9 +111,9 @@ class PM4Sand(Model):
         e_max, e_min = self.void_ratio_limits
         return e_max - (e_max - e_min) * self.Dr
 
-    def core(self) -> dict[str, float | None]:
-        """Parameters as the numerical core takes them; None asks for the model's default."""
-        return self.model_dump(exclude={"kind"})
+    def core(self) -> dict[str, float | str | None]:
+        """Kind and parameters as the numerical core takes them; None asks for the model's default."""
+        return self.model_dump()
 
 
 class Elastic(Model):
@@ -168,9 +172,9 @@ class Elastic(Model):
         assert self.K is not None
         return self.K
 
-    def core(self) -> dict[str, float | None]:
-        """Moduli as the numerical core takes them."""
-        return {"G": self.shear_modulus, "K": self.bulk_modulus}
+    def core(self) -> dict[str, float | str | None]:
+        """Kind and moduli as the numerical core takes them."""
+        return {"kind": self.kind, "G": self.shear_modulus, "K": self.bulk_modulus}
 
 
 Material = Annotated[PM4Sand | Elastic, Field(discriminator="kind")]

@@ -12,7 +12,7 @@ from .discretise import discretise
 from .motion import Motion
 from .motion._motion import SIGNIFICANT
 from .scene import Gravity, Scene
-from .simulation import LOOK_INTERVAL, Simulation, material_description
+from .simulation import LOOK_INTERVAL, Simulation
 
 # Wall time for which each stage is tried, s: long enough for thousands of steps of a column.
 TRIAL_SECONDS = 1.5
@@ -163,7 +163,7 @@ def pore_pressure_coefficients(scene: Scene) -> dict[str, float]:
     for index, region in enumerate(scene.regions):
         vertical = -float(particles.sigma_v_eff0[particles.region == index].max())
         lateral = region.K0 * vertical
-        _, bulk = _core.small_strain_moduli(material_description(region), (lateral, vertical, 0.0, lateral))
+        _, bulk = _core.small_strain_moduli(region.material.core(), (lateral, vertical, 0.0, lateral))
         water = scene.water.bulk_modulus / region.resolved(scene).porosity
         coefficients[region.name] = water / (water + bulk)
     return coefficients

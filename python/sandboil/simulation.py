@@ -17,6 +17,9 @@ from .scene import Gravity, Region, Scene, Shaking
 # How long the core computes before it looks whether the user wants to stop, s.
 LOOK_INTERVAL = 0.1
 
+# Most threads: beyond, no section has work enough, and starting them takes longer than a run.
+MAX_THREADS = 256
+
 # More steps than any stage makes; the core counts in 64 bits.
 _NO_LIMIT = 2**62
 
@@ -140,13 +143,12 @@ class Simulation:
     """
 
     def __init__(self, scene: Scene, threads: int = 2) -> None:
-        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-            raise InvalidInput("threads", threads, "must be a whole number, at least 1")
+        if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= MAX_THREADS:
+            raise InvalidInput("threads", threads, f"must be a whole number from 1 to {MAX_THREADS}")
         self.scene = scene
         self.particles = discretise(scene)
         self.probes = probes_of(scene, self.particles)
-        self.motions = [_motion(stage) for stage in scene.stages]
-        waves = [None if motion is None else motion.upgoing_velocity() for motion in self.motions]
+        self.motions, waves = _motions(scene)
         self._waves = [None if wave is None else (wave[0], np.ascontiguousarray(wave[1])) for wave in waves]
         self._durations = [
             stage.resolved_duration if isinstance(stage, Shaking) else None for stage in scene.stages
@@ -326,6 +328,10 @@ class Simulation:
             histories[name] = factor * values[:, :, k] if len(time) else np.empty((0, len(self.probes)))
         return time, histories
 
+    def finish_histories(self) -> None:
+        """Close the samples still collecting: the run ends here, before its stage does."""
+        self._core.finish_histories()
+
     # Accounting
 
     @property
@@ -370,8 +376,21 @@ def pore_pressure_ratio(pressure: Floats, sigma_v_eff0: Floats) -> Floats:
     return ratio
 
 
-def _motion(stage: Gravity | Shaking) -> Motion | None:
-    return stage.motion.load() if isinstance(stage, Shaking) and stage.motion is not None else None
+def _motions(scene: Scene) -> tuple[list[Motion | None], list[tuple[float, Floats] | None]]:
+    """The motion of every stage and its upgoing wave; what is wrong with one is told with its stage."""
+    motions: list[Motion | None] = []
+    waves: list[tuple[float, Floats] | None] = []
+    for i, stage in enumerate(scene.stages):
+        spec = stage.motion if isinstance(stage, Shaking) else None
+        try:
+            motions.append(None if spec is None else spec.load())
+            motion = motions[-1]
+            waves.append(None if motion is None else motion.upgoing_velocity())
+        except InvalidInput as error:
+            # A file's own place, line and all, follows the stage's.
+            path = error.path if error.path.startswith("motion") else f"motion, {error.path}"
+            raise InvalidInput(f"scene.stages[{i}].{path}", error.value, error.allowed, error.hint) from None
+    return motions, waves
 
 
 def stress_node_positions(particles: Discretisation) -> Floats:
@@ -387,6 +406,7 @@ def _description(scene: Scene, particles: Discretisation) -> dict[str, Any]:
     sigma_v_eff, _ = particles.stress_at(stress_node_positions(particles).reshape(-1, 2))
     water = scene.water
     numerics = scene.numerics.model_dump(exclude={"local_damping", "time_step_factor"})
+    numerics["velocity_filter"] = scene.numerics.filter_strength
     return {
         "spacing": particles.spacing,
         "position": particles.position,
@@ -408,15 +428,10 @@ def _region(scene: Scene, region: Region) -> dict[str, Any]:
     gravity = next(stage for stage in scene.stages if isinstance(stage, Gravity))
     poisson = gravity.initial_poisson_ratio
     return {
-        "material": material_description(region),
+        "material": region.material.core(),
         "porosity": soil.porosity,
         "solid_density": soil.solid_density,
         "hydraulic_conductivity": region.hydraulic_conductivity or 0.0,
         "earth_pressure_coefficient": region.K0,
         "static_poisson_ratio": region.initial_poisson_ratio if poisson is None else poisson,
     }
-
-
-def material_description(region: Region) -> dict[str, Any]:
-    """The soil of a region as the numerical core takes it."""
-    return {"kind": region.material.kind, **region.material.core()}

@@ -1,4 +1,7 @@
-"""The time step that `plan` announces is the limit: just below it runs hold, a quarter above they burst."""
+"""The time step that `plan` announces is the limit: just below it runs hold, a quarter above they burst.
+
+Undrained ground has the limit of a block with free corners, of which a column bears 1.3 times.
+"""
 
 from __future__ import annotations
 
@@ -48,6 +51,7 @@ CASES = {
     "dry": (None, {}),
     "dry, h 1.2 dx": (None, {"smoothing_ratio": 1.2}),
     "dry, unfiltered": (None, {"velocity_filter": 0.0}),
+    "undrained": (0.0, {}),
     "nearly undrained": (1e-12, {}),
     "draining, implicit": (1e-3, {"diffusion": "implicit"}),
     "draining, explicit": (1e-3, {"diffusion": "explicit"}),
@@ -59,8 +63,9 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_the_announced_limit_is_the_limit(case: str) -> None:
     conductivity, numerics = CASES[case]
+    above = 1.5 if case == "undrained" else 1.25
     below = largest_velocity(column(0.97, conductivity, **numerics))
     assert below < BOUND
     with pytest.raises(sb.SimulationDiverged) as caught:
-        largest_velocity(column(1.25, conductivity, **numerics))
+        largest_velocity(column(above, conductivity, **numerics))
     assert caught.value.time < DURATION

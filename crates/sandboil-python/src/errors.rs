@@ -16,10 +16,11 @@ fn exception(py: Python<'_>, error: SolverError) -> PyResult<PyErr> {
     let classes = py.import("sandboil._errors")?;
     let keywords = PyDict::new(py);
     let raised = match error {
-        SolverError::Diverged { quantity, node, x, y, time, step, .. } => {
+        SolverError::Diverged { quantity, node, x, y, value, time, step } => {
             keywords.set_item("quantity", quantity)?;
             keywords.set_item("node", node)?;
             keywords.set_item("position", (x, y))?;
+            keywords.set_item("value", value)?;
             keywords.set_item("time", time)?;
             keywords.set_item("step", step)?;
             classes.getattr("SimulationDiverged")?.call((), Some(&keywords))?

@@ -292,6 +292,11 @@ impl Simulation {
         self.inner.channel_names()
     }
 
+    /// Closes the samples still collecting: the run ends here.
+    fn finish_histories(&mut self) {
+        self.inner.finish_histories();
+    }
+
     /// History samples since the last call: times (m,) and values (m, probes, channels).
     fn take_histories<'py>(&mut self, py: Python<'py>) -> PyResult<Histories<'py>> {
         let (times, values) = self.inner.take_histories();

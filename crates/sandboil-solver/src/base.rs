@@ -58,7 +58,6 @@ pub struct CompliantBase {
     length: f64,
     wave: Option<UpgoingWave>,
     trace_before: Vec<f64>,
-    nodes: Vec<u32>,
 }
 
 impl CompliantBase {
@@ -83,16 +82,7 @@ impl CompliantBase {
         let rate: Vec<f64> = (0..points.len())
             .map(|point| trace.iter_row(point).map(|(node, weight)| weight * drag(node) / mass[node]).sum())
             .collect();
-        let mut nodes: Vec<u32> =
-            (0..points.len()).flat_map(|point| trace.row(point).0.iter().copied()).collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        Self { trace_before: vec![0.0; points.len()], trace, impedance, rate, length, wave, nodes }
-    }
-
-    /// Velocity nodes the base acts on.
-    pub fn nodes(&self) -> &[u32] {
-        &self.nodes
+        Self { trace_before: vec![0.0; points.len()], trace, impedance, rate, length, wave }
     }
 
     /// Dashpot coefficients, kPa s/m.

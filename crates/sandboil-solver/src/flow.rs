@@ -14,7 +14,8 @@ use crate::{
 };
 use sandboil_sph::{Csr, Vec2};
 
-/// A node whose pressure follows from the prescribed value on the free surface (half-cell rule).
+/// A node whose pressure follows from the prescribed value on the free surface (half-cell rule): only where the
+/// soil lets water out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct SurfaceNode {
     node: u32,
@@ -68,16 +69,18 @@ impl Flow {
     /// Zero excess pressure everywhere.
     pub fn new(model: &Model, phases: &Phases, scheme: FlowScheme) -> Option<Self> {
         let water = model.water?;
-        let per_node =
-            |value: &dyn Fn(usize) -> f64| model.region.iter().map(|&r| value(r as usize)).collect();
+        let conductivity: Vec<f64> =
+            model.region.iter().map(|&r| model.regions[r as usize].hydraulic_conductivity).collect();
+        let surface =
+            surface_nodes(model).into_iter().filter(|tie| conductivity[tie.node as usize] > 0.0).collect();
         Some(Self {
             excess: vec![0.0; model.nodes()],
             cofactor: vec![Deformation::default().cofactor(); model.nodes()],
             stiffness: (0..model.nodes()).map(|node| model.water_stiffness(phases.porosity(node))).collect(),
-            conductivity: per_node(&|region| model.regions[region].hydraulic_conductivity),
+            conductivity,
             unit_weight: water.unit_weight,
             gravity: model.gravity,
-            surface: surface_nodes(model),
+            surface,
             scheme: match scheme {
                 FlowScheme::Undrained => Scheme::Undrained,
                 FlowScheme::Explicit => Scheme::Explicit { acceleration_term: false },
@@ -199,10 +202,8 @@ impl Flow {
                 lu.solve(&mut self.right_hand_side);
                 self.excess.copy_from_slice(&self.right_hand_side);
             }
-            _ => {
-                self.excess.copy_from_slice(&self.right_hand_side);
-                self.hold_surface();
-            }
+            // Nothing flows, so nothing drains at the surface either.
+            _ => self.excess.copy_from_slice(&self.right_hand_side),
         }
         true
     }
@@ -303,6 +304,21 @@ mod tests {
         let exact = CONTRAST * (SIDE as f64 - 10.0) + (10.0 - 2.5);
         // The contact lies where it should to a tenth of a spacing.
         assert!((head[SIDE * 2] - exact).abs() < 0.1 * CONTRAST, "{} {exact}", head[SIDE * 2]);
+    }
+
+    /// A soil that is pressed together stiffens its pore water: `K_f / n` follows the porosity of a new geometry.
+    #[test]
+    fn water_stiffens_as_pores_close() {
+        let mut model = square_block(3);
+        model.water = Some(Water { unit_weight: 10.0, bulk_modulus: 8.0 });
+        let mut phases = Phases::new(&model);
+        let mut flow = Flow::new(&model, &phases, FlowScheme::Undrained).unwrap();
+        assert_eq!(flow.stiffness[4], 8.0 / 0.5);
+        let strained = StressPoint { strain: [0.0, -0.1, 0.0], ..StressPoint::default() };
+        phases.follow(&vec![strained; STRESS_NODES * model.nodes()]);
+        flow.geometry_changed(&model, &phases);
+        let porosity = 1.0 - 0.5 * 0.1_f64.exp();
+        assert!((flow.stiffness[4] - 8.0 / porosity).abs() < 1e-12);
     }
 
     /// Acceleration that spreads draws water apart: `dp/dt = (K_f/n) (k/g) div a`, where k is uniform.

@@ -961,6 +961,14 @@ impl Simulation {
         }
     }
 
+    /// Closes the samples still collecting, for a run that ends before its stage does: their windows are one-sided.
+    pub fn finish_histories(&mut self) {
+        let time = self.time;
+        if let Active::Shaking(shaking) = &mut self.active {
+            shaking.recorder.finish(time);
+        }
+    }
+
     /// History samples finished since the last call: times (s) and one row for each time, probe after probe.
     pub fn take_histories(&mut self) -> (Vec<f64>, Vec<f64>) {
         match &mut self.active {

@@ -10,6 +10,8 @@ use sandboil_sph::{
 const DRAINED_COEFFICIENT: f64 = 0.99;
 /// Limit of the undrained wave over `h / c_u`, surfaces at prescribed pressure.
 const UNDRAINED_COEFFICIENT: f64 = 1.7;
+/// The same where pressure is prescribed nowhere: undrained soil.
+const FREE_UNDRAINED_COEFFICIENT: f64 = 0.9;
 /// Explicit diffusion: `dt <= 0.65 dx^2 C / k`.
 const DIFFUSION_COEFFICIENT: f64 = 0.65;
 /// Largest eigenvalue of the velocity filter over `xi C_s / dx`.
@@ -148,9 +150,10 @@ pub fn region_limit(
         return drained;
     }
     let water = model.water_stiffness(model.regions[region].porosity);
-    let undrained = (wave(UNDRAINED_COEFFICIENT, skeleton_stiffness + water), Criterion::UndrainedWave);
-    let combined = if undrained.0 < drained.0 { undrained } else { drained };
     let diffusivity = model.pressure_diffusivity(region);
+    let coefficient = if diffusivity > 0.0 { UNDRAINED_COEFFICIENT } else { FREE_UNDRAINED_COEFFICIENT };
+    let undrained = (wave(coefficient, skeleton_stiffness + water), Criterion::UndrainedWave);
+    let combined = if undrained.0 < drained.0 { undrained } else { drained };
     if diffusivity == 0.0 {
         return combined;
     }

@@ -11,14 +11,21 @@ from pathlib import Path
 import numpy as np
 
 from .._errors import InvalidInput, nearest_name
-from ._series import MAX_SAMPLES, STANDARD_GRAVITY, Array, Quantity, finite_series, ground_motion, positive
+from ._series import (
+    MAX_DT,
+    MAX_SAMPLES,
+    STANDARD_GRAVITY,
+    Array,
+    Quantity,
+    finite_series,
+    ground_motion,
+    positive,
+)
 
 # Text of a record: 100 MB hold MAX_SAMPLES rows of a CSV with three columns of full precision.
 MAX_FILE_BYTES = 100_000_000
 # An .AT2 says its number of points within this many lines (four, in PEER's own).
 MAX_HEADER_LINES = 50
-# Coarsest spacing of a strong-motion record, s: digitised accelerograms have 0.02; above, dt is in ms.
-MAX_RECORD_DT = 0.5
 # A step of the time column may differ from the others by this fraction of it: rounded decimals differ
 # less, a missing sample by one whole step.
 STEP_TOLERANCE = 0.25
@@ -128,12 +135,12 @@ def _at2_header(name: str, lines: list[str]) -> tuple[int, int, float]:
 
 
 def _record_dt(place: str, value: object) -> float:
-    hint = f"the spacing in seconds, at most {MAX_RECORD_DT:g}, for example 0.005"
-    dt = positive(place, value, "seconds", hint)
-    if dt > MAX_RECORD_DT:
-        raise InvalidInput(
-            place, value, f"must be at most {MAX_RECORD_DT:g} s", "it is probably in milliseconds"
-        )
+    hint = f"the spacing in seconds, at most {MAX_DT:g}, for example 0.005"
+    # Fortran writes exponents with a D.
+    number = re.sub("[dD]", "e", value) if isinstance(value, str) else value
+    dt = positive(place, number, "seconds", hint)
+    if dt > MAX_DT:
+        raise InvalidInput(place, value, f"must be at most {MAX_DT:g} s", "it is probably in milliseconds")
     return dt
 
 
@@ -207,6 +214,7 @@ def read_csv(path: str | os.PathLike[str], unit: str | None, column: str | int |
             "must be a header row that names a time column and at least one more",
             'for example "time_s,acceleration_g"',
         )
+    unit = unit if unit is None else _plain_unit(unit) or unit
     if unit is not None and unit not in UNITS:
         raise InvalidInput("unit", unit, f"must be one of {', '.join(UNITS)}", _did_you_mean(unit, UNITS))
     time_at = next((i for i, cell in enumerate(header) if _TIME_COLUMN.match(cell)), 0)

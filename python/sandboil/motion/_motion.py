@@ -14,6 +14,7 @@ import numpy.typing as npt
 from .._errors import InvalidInput, nearest_name
 from . import _files, _generators
 from ._series import (
+    MAX_DT,
     STANDARD_GRAVITY,
     Array,
     Quantity,
@@ -82,6 +83,8 @@ class Motion:
         quantity: Quantity = "velocity" if acceleration_g is None else "acceleration_g"
         samples = velocity if acceleration_g is None else acceleration_g
         spacing = positive("motion.dt", dt, "seconds")
+        if isinstance(dt, bool) or spacing > MAX_DT:
+            raise InvalidInput("motion.dt", dt, f"must be a number of seconds, at most {MAX_DT:g}")
         self.__dict__.update(
             dt=spacing,
             kind=_kind(kind),
@@ -296,7 +299,7 @@ class Motion:
                 self.kind,
                 'must be "outcrop" or "upgoing" for a compliant base: a motion within the ground holds the '
                 "downgoing wave too, which the base would send up again",
-                "deconvolve it to the upgoing wave first",
+                "give the outcrop motion of the same rock, or the upgoing wave alone",
             )
         return self.dt, self.velocity if self.kind == "upgoing" else _read_only(0.5 * self.velocity)
 

@@ -28,6 +28,8 @@ MAX_SAMPLES = 2_000_000
 # Degree of the polynomial taken from the acceleration: two coefficients meet the two end conditions and
 # two follow the drift.
 BASELINE_DEGREE = 3
+# Coarsest spacing of a strong motion, s: digitised accelerograms have 0.02; above, dt is in ms.
+MAX_DT = 0.5
 # Zero padding before and after a filtered series, in (order / corner frequency), after Boore (2005).
 PADDING_PER_ORDER = 1.5
 

@@ -12,7 +12,7 @@ pub fn numerics() -> Numerics {
     Numerics {
         operators: Operators::Conservative,
         smoothing_ratio: 1.4,
-        velocity_filter: 0.1,
+        velocity_filter: 0.2,
         diffusion: Diffusion::Auto,
         acceleration_term: AccelerationTerm::Auto,
         geometry_strain_limit: None,

@@ -106,3 +106,29 @@ fn a_bursting_sand_column_is_told_at_once() {
     let error = simulation.advance(u64::MAX, f64::INFINITY).unwrap_err();
     assert!(matches!(error, sandboil_solver::SolverError::Diverged { .. }), "{error}");
 }
+
+/// Envelopes hold the largest value of every step, not only of those that anybody looks at.
+#[test]
+fn envelopes_see_every_step() {
+    let mut simulation = at_rest(&sand_column(Operators::Conservative));
+    let velocity = (0..500).map(|k| 0.3 * (0.02 * f64::from(k)).sin()).collect();
+    let mut stage = shaking(Some(UpgoingWave { interval: 1e-3, velocity }), 0.5, Vec::new());
+    stage.pressure_envelope = true;
+    stage.strain_envelope = true;
+    simulation.begin_shaking(stage).unwrap();
+    let mut pressure = simulation.excess_pore_pressure().unwrap();
+    let mut strain = vec![0.0_f64; pressure.len()];
+    while !simulation.is_complete() {
+        // An envelope takes the state that its step begins with.
+        for (largest, now) in pressure.iter_mut().zip(simulation.excess_pore_pressure().unwrap()) {
+            *largest = largest.max(now);
+        }
+        for (largest, now) in strain.iter_mut().zip(simulation.strain()) {
+            let shear = now.map(|[xx, yy, xy]| (xx - yy).hypot(xy));
+            *largest = largest.max(shear[0]).max(shear[1]);
+        }
+        simulation.advance(1, f64::INFINITY).unwrap();
+    }
+    assert_eq!(simulation.largest_excess_pore_pressure().unwrap(), pressure);
+    assert_eq!(simulation.largest_shear_strain().unwrap(), strain);
+}
