@@ -5,9 +5,16 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Simulation", "__version__", "small_strain_moduli", "stress_node_offset"]
+__all__ = [
+    "ACCELERATION_TERM_CONDUCTIVITY",
+    "Simulation",
+    "__version__",
+    "small_strain_moduli",
+    "stress_node_offset",
+]
 
 __version__: str
+ACCELERATION_TERM_CONDUCTIVITY: float
 
 def small_strain_moduli(
     material: dict[str, Any], stress: tuple[float, float, float, float]

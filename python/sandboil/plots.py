@@ -156,7 +156,9 @@ def surface(run: Run, *, reference: Reference | None = None, stage: str | None =
     if reference is not None:
         values = _column_of(reference.histories, "acc_surface_g")
         label = f"reference, peak {np.abs(values).max():.3f} g"
-        top.plot(_column_of(reference.histories, "time_s"), values, color=_REFERENCE, lw=0.6, label=label)
+        top.plot(
+            _column_of(reference.histories, "time_s"), values, color=_REFERENCE, lw=0.7, ls="--", label=label
+        )
     top.set(ylabel="horizontal acceleration, g", xlim=(0.0, history.time[-1]))
     top.legend(loc="upper right")
     if motion is not None:
@@ -197,7 +199,7 @@ def pore_pressure(run: Run, *, reference: Reference | None = None, stage: str | 
         name = f"ru_{depth:g}m"
         if reference is not None and name in reference.histories:
             time = _column_of(reference.histories, "time_s")
-            axes.plot(time, reference.histories[name], color=_REFERENCE, label="reference")
+            axes.plot(time, reference.histories[name], color=_REFERENCE, ls="--", label="reference", zorder=4)
         axes.axhline(1.0, color="black", lw=0.6, ls=":")
         axes.set(ylabel="$r_u$", ylim=(min(0.0, history.values.min()), max(1.1, history.values.max())))
         axes.set_title(f"{depth:g} m below the surface", loc="left", fontsize=9)
@@ -234,6 +236,7 @@ def _draw_map(run: Run, stage: str, times: Floats, axes: Axes) -> None:
         axes.axhline(below, color="white", lw=0.6, ls=":")
     _, bottom, _, top = run.scene.bounds
     axes.set(xlabel="time, s", ylabel="depth below the surface, m", ylim=(top - bottom, 0.0))
+    axes.set_xlim(times[0], times[-1])
     axes.set_title(f"excess pore pressure ratio at x = {profile.x:g} m", loc="left", fontsize=9)
     axes.grid(visible=False)
 

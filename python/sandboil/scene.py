@@ -48,9 +48,6 @@ MAX_FRAMES = 100_000
 # Relative mismatch up to which densities given twice are the same: they come with three to four digits.
 DENSITY_TOLERANCE = 1.0e-3
 
-# Above this conductivity, m/s, the pore water's acceleration limits the time step and is left out by "auto".
-ACCELERATION_TERM_CONDUCTIVITY = 3.0e-3
-
 Point = tuple[Number, Number]
 Count = Annotated[int, Field(strict=True, ge=1)]
 Poisson = Annotated[Number, Field(ge=0.0, lt=0.5)]
@@ -854,7 +851,8 @@ class Scene(Model):
         if self.water is None or max(conductivities) == 0.0 or self.numerics.acceleration_term == "off":
             return False
         return (
-            self.numerics.acceleration_term == "on" or max(conductivities) <= ACCELERATION_TERM_CONDUCTIVITY
+            self.numerics.acceleration_term == "on"
+            or max(conductivities) <= _core.ACCELERATION_TERM_CONDUCTIVITY
         )
 
     def active_physics(self) -> list[tuple[str, bool, str]]:
@@ -874,7 +872,7 @@ class Scene(Model):
         no_flow = ((not wet, dry), (not shaken, still), (not permeable, "no region is permeable"))
         term = self.numerics.acceleration_term
         compared = "no region exceeds" if self.uses_acceleration_term else "a region exceeds"
-        chosen = f"{compared} {ACCELERATION_TERM_CONDUCTIVITY:g} m/s"
+        chosen = f"{compared} {_core.ACCELERATION_TERM_CONDUCTIVITY:g} m/s"
         if term != "auto":
             chosen = f"numerics.acceleration_term is {term!r}"
         return [

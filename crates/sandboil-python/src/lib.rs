@@ -16,6 +16,7 @@ mod _core {
 
     #[pymodule_init]
     fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {
+        m.add("ACCELERATION_TERM_CONDUCTIVITY", sandboil_solver::ACCELERATION_TERM_CONDUCTIVITY)?;
         m.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

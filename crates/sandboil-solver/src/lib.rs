@@ -27,5 +27,7 @@ pub use model::{
     AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, Soil, Water, stress_node_offset,
 };
 pub use sandboil_sph::{Period, Vec2};
-pub use simulation::{Counters, Gravity, SHAKING_FACTOR, Shaking, Simulation};
+pub use simulation::{
+    ACCELERATION_TERM_CONDUCTIVITY, Counters, Gravity, SHAKING_FACTOR, Shaking, Simulation,
+};
 pub use timestep::Criterion;

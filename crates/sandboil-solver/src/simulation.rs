@@ -30,7 +30,7 @@ const GROW_AT: f64 = 1.3;
 /// Implicit diffusion is chosen where it lengthens the step by more than this.
 const IMPLICIT_GAIN: f64 = 1.2;
 /// Largest conductivity for the acceleration term of Eq. 7 when it is left to us, m/s: above, it limits dt.
-const ACCELERATION_TERM_CONDUCTIVITY: f64 = 3e-3;
+pub const ACCELERATION_TERM_CONDUCTIVITY: f64 = 3e-3;
 /// Speed no soil particle reaches, m/s: a run that does has diverged.
 const RUNAWAY_SPEED: f64 = 1e3;
 /// Mean over largest unbalanced acceleration that the gravity stage asks for.
