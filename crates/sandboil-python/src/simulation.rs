@@ -154,11 +154,6 @@ impl Simulation {
         Ok(self.inner.begin_shaking(stage).map_err(CoreError)?)
     }
 
-    #[expect(clippy::needless_pass_by_value, reason = "PyO3 hands arguments over by value")]
-    fn set_excess_pore_pressure(&mut self, excess: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
-        Ok(self.inner.set_excess_pore_pressure(excess.as_slice()?).map_err(CoreError)?)
-    }
-
     /// Steps until `until` (s), `steps` are made or `seconds` have passed; returns whether the stage is over.
     #[pyo3(signature = (*, steps, until, seconds))]
     fn advance(&mut self, py: Python<'_>, steps: u64, until: f64, seconds: f64) -> PyResult<bool> {
