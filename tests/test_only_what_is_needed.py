@@ -24,7 +24,7 @@ def elastic_column(**changes: object) -> Scene:
 
 def test_the_whole_scene_uses_everything() -> None:
     simulation = at_the_end(scenes.column())
-    needed = {"pore_pressure", "sand_state", "base", "pressure_envelope", "strain_envelope"}
+    needed = {"pore_pressure", "soil_state", "base", "pressure_envelope", "strain_envelope"}
     assert needed <= simulation.arrays().keys()
     counters = simulation.counters()
     shaken = simulation.steps
@@ -60,7 +60,7 @@ def test_water_sets_the_time_step_only_where_there_is_water() -> None:
 
 def test_an_elastic_column_has_no_sand() -> None:
     simulation = at_the_end(elastic_column())
-    assert "sand_state" not in simulation.arrays()
+    assert "soil_state" not in simulation.arrays()
     counters = simulation.counters()
     assert counters["plastic_updates"] == counters["substeps"] == counters["evaluations"] == 0
     assert counters["flow_calls"] > 0
@@ -69,7 +69,7 @@ def test_an_elastic_column_has_no_sand() -> None:
 def test_without_shaking_there_is_no_dashpot_and_no_flow() -> None:
     simulation = Simulation(scenes.column(stages=[Gravity()]), threads=1)
     simulation.run_stage()
-    assert not {"base", "pore_pressure", "sand_state", "pressure_envelope"} & simulation.arrays().keys()
+    assert not {"base", "pore_pressure", "soil_state", "pressure_envelope"} & simulation.arrays().keys()
     counters = simulation.counters()
     assert counters["base_calls"] == counters["flow_calls"] == counters["plastic_updates"] == 0
     assert counters["steps"] > 0

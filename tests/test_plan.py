@@ -38,7 +38,7 @@ def test_the_plan_foresees_the_run(finished: Run) -> None:
     assert shaking.steps == pytest.approx(finished.accounts()["steps"], rel=0.05)
     assert (plan.nodes, plan.stress_nodes, shaking.duration) == (32, 64, 0.8)
     told = finished.accounts()
-    assert plan.arrays["sand_state"] == told["bytes_sand_state"]
+    assert plan.arrays["soil_state"] == told["bytes_soil_state"]
     # Timed on a machine that others use too: the order of magnitude.
     assert plan.wall_time is not None
     measured = finished.accounts("gravity")["wall_time_s"] + told["wall_time_s"]

@@ -3,11 +3,11 @@
 use crate::errors::CoreError;
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
 use sandboil_soil::{
-    Integrator, SoilError, Stress,
+    Integrator, Soil, SoilError, Stress,
     elastic::Elastic,
     pm4sand::{Options, PM4Sand, Parameters},
 };
-use sandboil_solver::{Soil, SolverError};
+use sandboil_solver::SolverError;
 
 fn refused(error: &SoilError) -> PyErr {
     match *error {
@@ -78,14 +78,9 @@ pub fn soil(dict: &Bound<'_, PyDict>, gap_memory: bool) -> PyResult<Soil> {
 /// positive.
 #[pyfunction]
 pub fn small_strain_moduli(material: &Bound<'_, PyDict>, stress: [f64; 4]) -> PyResult<(f64, f64)> {
-    let moduli = match soil(material, false)? {
-        Soil::Elastic(elastic) => elastic.moduli(),
-        Soil::PM4Sand(sand) => {
-            let [xx, yy, xy, zz] = stress;
-            let state = sand.initialise(Stress { xx, yy, xy, zz }).map_err(|error| refused(&error))?;
-            sand.moduli(&state)
-        }
-    };
+    let [xx, yy, xy, zz] = stress;
+    let moduli = soil(material, false)?.small_strain_moduli(Stress { xx, yy, xy, zz });
+    let moduli = moduli.map_err(|error| refused(&error))?;
     Ok((moduli.shear, moduli.bulk))
 }
 

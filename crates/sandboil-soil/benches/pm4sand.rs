@@ -11,7 +11,7 @@ mod yardstick;
 use criterion::{BenchmarkId, Criterion, Throughput};
 use point::{CALIBRATIONS, StrainPath, advance, consolidated, parts, sand, shear};
 use sandboil_soil::pm4sand::{PM4Sand, State};
-use sandboil_soil::{Integrator, StrainIncrement};
+use sandboil_soil::{Integrator, SoilModel, StrainIncrement};
 
 /// Largest strain component of a host step.
 const HOST_INCREMENTS: [f64; 3] = [1e-6, 2.5e-6, 1e-5];

@@ -1,6 +1,9 @@
 //! Linear isotropic elasticity in plane strain, with the Jaumann rate of stress.
 
-use crate::{Moduli, SoilError, StrainIncrement, Stress, bulk_to_shear, error::finite, tensor::Deviator};
+use crate::{
+    Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport, bulk_to_shear,
+    error::finite, tensor::Deviator,
+};
 
 /// Linear isotropic elastic material.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,7 +35,7 @@ impl Elastic {
     }
 
     /// Bulk and shear modulus, kPa.
-    pub fn moduli(&self) -> Moduli {
+    pub fn constants(&self) -> Moduli {
         self.moduli
     }
 
@@ -41,7 +44,7 @@ impl Elastic {
     /// The rotation is the Cayley form of Hughes and Winget (1980): a rotation for any spin, so invariants are
     /// kept to round-off, and the Jaumann rate in the limit.
     #[inline]
-    pub fn update(&self, stress: &Stress, de: &StrainIncrement) -> Stress {
+    pub fn moved(&self, stress: &Stress, de: &StrainIncrement) -> Stress {
         let Moduli { bulk, shear } = self.moduli;
         let volume = de.xx + de.yy;
         let mean = 0.5 * (stress.xx + stress.yy) + self.moduli.mean_stress_stiffness() * volume;
@@ -55,6 +58,36 @@ impl Elastic {
             xy: deviator.xy,
             zz: stress.zz + (bulk - 2.0 / 3.0 * shear) * volume,
         }
+    }
+}
+
+impl SoilModel for Elastic {
+    type State = Stress;
+
+    fn initialise(&self, stress: Stress, _void_ratio: Option<f64>) -> Result<Stress, SoilError> {
+        stress.finite("initial stress")
+    }
+
+    fn update(
+        &self,
+        state: &mut Stress,
+        de: &StrainIncrement,
+        _integrator: &Integrator,
+    ) -> Result<UpdateReport, SoilError> {
+        *state = self.moved(state, de).finite("stress")?;
+        Ok(UpdateReport::default())
+    }
+
+    fn stress(&self, state: &Stress) -> Stress {
+        *state
+    }
+
+    fn moduli(&self, _state: &Stress) -> Moduli {
+        self.moduli
+    }
+
+    fn static_shear_modulus(&self) -> f64 {
+        self.moduli.shear
     }
 }
 
@@ -78,7 +111,7 @@ mod tests {
     #[test]
     fn one_dimensional_compression_is_stiff_by_k_plus_four_thirds_g() {
         let stress =
-            rock().update(&Stress::default(), &StrainIncrement { yy: -1e-4, ..StrainIncrement::default() });
+            rock().moved(&Stress::default(), &StrainIncrement { yy: -1e-4, ..StrainIncrement::default() });
         assert!((stress.yy + (3.0e5 + 4.0 / 3.0 * 1.0e5) * 1e-4).abs() < 1e-9);
         assert!((stress.xx + (3.0e5 - 2.0 / 3.0 * 1.0e5) * 1e-4).abs() < 1e-9);
         assert!((stress.zz - stress.xx).abs() < 1e-12);
@@ -88,14 +121,14 @@ mod tests {
     fn poisson_ratio_gives_the_earth_pressure_coefficient() {
         let soil = Elastic::from_poisson(5.0e4, 1.0 / 3.0).unwrap();
         let stress =
-            soil.update(&Stress::default(), &StrainIncrement { yy: -1e-4, ..StrainIncrement::default() });
+            soil.moved(&Stress::default(), &StrainIncrement { yy: -1e-4, ..StrainIncrement::default() });
         assert!((stress.xx / stress.yy - 0.5).abs() < 1e-12);
     }
 
     #[test]
     fn shear_strain_is_engineering() {
         let stress =
-            rock().update(&Stress::default(), &StrainIncrement { xy: 1e-4, ..StrainIncrement::default() });
+            rock().moved(&Stress::default(), &StrainIncrement { xy: 1e-4, ..StrainIncrement::default() });
         assert!((stress.xy - 10.0).abs() < 1e-9);
     }
 
@@ -106,7 +139,7 @@ mod tests {
         let spin = std::f64::consts::FRAC_PI_2 / f64::from(steps);
         let mut stress = start;
         for _ in 0..steps {
-            stress = rock().update(&stress, &StrainIncrement { spin, ..StrainIncrement::default() });
+            stress = rock().moved(&stress, &StrainIncrement { spin, ..StrainIncrement::default() });
         }
         assert!((stress.xx - start.yy).abs() < 1e-3 && (stress.yy - start.xx).abs() < 1e-3);
         assert!((stress.xy + start.xy).abs() < 1e-3);
@@ -116,7 +149,7 @@ mod tests {
     fn spin_follows_the_jaumann_rate() {
         let start = Stress { xx: -50.0, yy: -100.0, xy: 7.0, zz: -50.0 };
         let w = 1e-6;
-        let turned = rock().update(&start, &StrainIncrement { spin: w, ..StrainIncrement::default() });
+        let turned = rock().moved(&start, &StrainIncrement { spin: w, ..StrainIncrement::default() });
         assert!((turned.xx - start.xx - 2.0 * w * start.xy).abs() < 1e-9);
         assert!((turned.yy - start.yy + 2.0 * w * start.xy).abs() < 1e-9);
         assert!((turned.xy - start.xy - w * (start.yy - start.xx)).abs() < 1e-9);

@@ -6,12 +6,14 @@
 pub mod elastic;
 mod error;
 mod integrator;
+mod model;
 pub mod pm4sand;
 mod report;
 mod tensor;
 
 pub use error::SoilError;
 pub use integrator::Integrator;
+pub use model::{Soil, SoilModel};
 pub use report::UpdateReport;
 pub use tensor::{Deviator, StrainIncrement, Stress};
 

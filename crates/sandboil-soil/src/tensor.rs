@@ -1,5 +1,6 @@
 //! In-plane tensors. A symmetric plane tensor is its mean and its deviator; the deviator has two numbers.
 
+use crate::error::{SoilError, finite};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 /// Effective stress, kPa, tension positive; `x` horizontal, `y` up, `zz` out of plane.
@@ -13,6 +14,16 @@ pub struct Stress {
     pub xy: f64,
     /// Out-of-plane normal stress, kPa.
     pub zz: f64,
+}
+
+impl Stress {
+    /// The stress itself, refused if a component is not a finite number.
+    pub(crate) fn finite(self, quantity: &'static str) -> Result<Self, SoilError> {
+        for component in [self.xx, self.yy, self.xy, self.zz] {
+            finite(quantity, component)?;
+        }
+        Ok(self)
+    }
 }
 
 /// Strain increment of a plane-strain point, tension positive.

@@ -4,7 +4,7 @@
 mod point;
 
 use point::{CALIBRATIONS, advance, consolidated, cyclic_shear, sand, shear};
-use sandboil_soil::Integrator;
+use sandboil_soil::{Integrator, SoilModel};
 
 /// Shear strain, then `s_xx`, `s_yy`, `tau` (kPa, compression positive) of each calibration.
 const MONOTONIC: [(f64, [[f64; 3]; 3]); 5] = [

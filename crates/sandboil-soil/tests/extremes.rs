@@ -4,7 +4,7 @@ mod point;
 
 use point::{CALIBRATIONS, advance, anisotropic, consolidated, sand, shear};
 use sandboil_soil::pm4sand::{PM4Sand, State};
-use sandboil_soil::{Integrator, StrainIncrement, Stress};
+use sandboil_soil::{Integrator, SoilModel, StrainIncrement, Stress};
 
 fn integrators() -> [Integrator; 3] {
     let rk4 = Integrator::RungeKutta4 { max_increment: Integrator::DEFAULT_INCREMENT };
@@ -50,7 +50,7 @@ fn hundred_thousand_tiny_cycles_at_the_smallest_pressure() {
     let pressure = 0.005 * sand.parameters().p_atm;
     let start = Stress { xx: -pressure, yy: -pressure, xy: 0.0, zz: -pressure };
     for amplitude in [1e-6, 1e-5] {
-        let mut state = sand.initialise(start).unwrap();
+        let mut state = sand.initialise(start, None).unwrap();
         for _ in 0..100_000 {
             for sign in [1.0, -1.0, -1.0, 1.0] {
                 advance(&sand, &mut state, &shear(sign * amplitude), &Integrator::default());
@@ -88,7 +88,7 @@ fn a_million_tiny_cycles_drift_little() {
     let sand = sand(CALIBRATIONS[1]);
     let isotropic = Stress { xx: -76.0, yy: -76.0, xy: 0.0, zz: -76.0 };
     for (start, allowed) in [(isotropic, 1e-6), (anisotropic(), 0.05)] {
-        let mut state = sand.initialise(start).unwrap();
+        let mut state = sand.initialise(start, None).unwrap();
         for _ in 0..1_000_000 {
             for sign in [1.0, -1.0] {
                 advance(&sand, &mut state, &shear(sign * 1e-6), &Integrator::default());

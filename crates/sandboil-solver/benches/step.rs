@@ -12,8 +12,11 @@ mod yardstick;
 
 use common::{column, elastic, shaking};
 use criterion::{BenchmarkId, Criterion, Throughput};
-use sandboil_soil::pm4sand::{Options, PM4Sand, Parameters};
-use sandboil_solver::{Gravity, Model, Simulation, Soil, UpgoingWave, Water};
+use sandboil_soil::{
+    Soil,
+    pm4sand::{Options, PM4Sand, Parameters},
+};
+use sandboil_solver::{Gravity, Model, Simulation, UpgoingWave, Water};
 
 const WATER: Water = Water { unit_weight: 10.0, bulk_modulus: 1e6 };
 /// Height over spacing of the blocks.

@@ -23,9 +23,7 @@ mod timestep;
 
 pub use base::UpgoingWave;
 pub use error::SolverError;
-pub use model::{
-    AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, Soil, Water, stress_node_offset,
-};
+pub use model::{AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, Water, stress_node_offset};
 pub use sandboil_sph::{Period, Vec2};
 pub use simulation::{
     ACCELERATION_TERM_CONDUCTIVITY, Counters, Gravity, SHAKING_FACTOR, Shaking, Simulation,

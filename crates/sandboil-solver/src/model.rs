@@ -1,7 +1,7 @@
 //! What is solved: nodes, regions, water and numerical choices, checked once.
 
 use crate::error::SolverError;
-use sandboil_soil::{elastic::Elastic, pm4sand::PM4Sand};
+use sandboil_soil::Soil;
 use sandboil_sph::{Period, Vec2};
 
 /// Stress nodes carried by each velocity node.
@@ -9,25 +9,6 @@ pub const STRESS_NODES: usize = 2;
 
 /// Distance of a stress node from its velocity node over the particle spacing, along the diagonal (Section 3).
 const STRESS_NODE_DISTANCE: f64 = 1.0 / 3.0;
-
-/// A soil model as one region uses it.
-#[derive(Debug, Clone)]
-pub enum Soil {
-    /// Linear elasticity.
-    Elastic(Elastic),
-    /// PM4Sand, elastic in statics, plastic once shaking begins.
-    PM4Sand(Box<PM4Sand>),
-}
-
-impl Soil {
-    /// Shear modulus of the static stage, kPa: the model's modulus at one atmosphere for sand.
-    pub fn static_shear_modulus(&self) -> f64 {
-        match self {
-            Self::Elastic(elastic) => elastic.moduli().shear,
-            Self::PM4Sand(sand) => sand.parameters().g0 * sand.parameters().p_atm,
-        }
-    }
-}
 
 /// One region: a soil with its densities and conductivity.
 #[derive(Debug, Clone)]

@@ -6,7 +6,7 @@ use crate::{
     error::SolverError,
     flow::{Flow, FlowScheme},
     geometry::{Geometry, Wall, consistent_gradient, point_weights, stress_node_positions},
-    model::{AccelerationTerm, Diffusion, Model, Operators, STRESS_NODES, Soil},
+    model::{AccelerationTerm, Diffusion, Model, Operators, STRESS_NODES},
     parallel::{Rows, chunks, for_each_chunk},
     phases::Phases,
     record::{Probes, Recorder},
@@ -266,7 +266,7 @@ impl Simulation {
         for point in &mut self.points {
             point.strain = [0.0; 3];
         }
-        let impedance = self.base_impedance(stage.half_space);
+        let impedance = self.base_impedance(stage.half_space)?;
         let base = CompliantBase::new(&self.model, &self.position, &self.mass, impedance, stage.wave.clone());
         let scheme = self.flow_scheme(stage.time_step_factor);
         let excess = self.flow.take().map(|flow| flow.excess);
@@ -457,10 +457,10 @@ impl Simulation {
 
     /// `rho_m C_s` of the layer above each base point, from the model's small-strain modulus at the base's
     /// stress, or of the half-space that was given.
-    fn base_impedance(&self, half_space: Option<(f64, f64)>) -> Vec<f64> {
+    fn base_impedance(&self, half_space: Option<(f64, f64)>) -> Result<Vec<f64>, SolverError> {
         let points = base_points(&self.model, &self.position);
         if let Some((speed, density)) = half_space {
-            return vec![density * speed; points.len()];
+            return Ok(vec![density * speed; points.len()]);
         }
         let stress_position = stress_node_positions(&self.position, self.model.spacing);
         let weights = point_weights(&self.model, &stress_position, &points);
@@ -478,11 +478,9 @@ impl Simulation {
                     xy: at_base(&|s| s.xy),
                     zz: at_base(&|s| s.zz),
                 };
-                let modulus = match &self.model.regions[region].soil {
-                    Soil::Elastic(elastic) => elastic.moduli().shear,
-                    Soil::PM4Sand(sand) => sand.small_strain_shear_modulus(&stress),
-                };
-                (density * modulus).sqrt()
+                let moduli = self.model.regions[region].soil.small_strain_moduli(stress);
+                let moduli = moduli.map_err(|source| SolverError::Soil { region, node, source })?;
+                Ok((density * moduli.shear).sqrt())
             })
             .collect()
     }
@@ -873,7 +871,7 @@ impl Simulation {
             arrays.push(("pore_pressure", flow.bytes()));
         }
         if self.soil.plastic_points() > 0 {
-            arrays.push(("sand_state", self.soil.state_bytes()));
+            arrays.push(("soil_state", self.soil.state_bytes()));
         }
         if let Some(printed) = &self.printed_stress {
             arrays.push(("printed_stress", printed.bytes()));

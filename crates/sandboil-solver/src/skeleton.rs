@@ -210,10 +210,10 @@ pub(crate) mod tests {
     use super::*;
     use crate::{
         geometry::Wall,
-        model::{AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, STRESS_NODES, Soil},
+        model::{AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, STRESS_NODES},
     };
     use proptest::prelude::*;
-    use sandboil_soil::{Integrator, elastic::Elastic};
+    use sandboil_soil::{Integrator, Soil, elastic::Elastic};
     use sandboil_sph::Period;
 
     const COLUMNS: usize = 5;

@@ -3,30 +3,30 @@
 use crate::{
     error::SolverError,
     geometry::Geometry,
-    model::{Model, STRESS_NODES, Soil},
+    model::{Model, STRESS_NODES},
     parallel::{Rows, chunks, for_each_chunk},
     skeleton::{NodalShare, StressPoint, motion},
 };
 use sandboil_soil::{
-    Integrator, Moduli, SoilError, StrainIncrement, UpdateReport,
-    elastic::Elastic,
-    pm4sand::{PM4Sand, State},
+    Integrator, Moduli, Soil, SoilError, SoilModel, StrainIncrement, UpdateReport, elastic::Elastic,
+    with_model,
 };
 use sandboil_sph::Vec2;
-use std::ops::Range;
+use std::{fmt::Debug, ops::Range};
 
 /// One region's stress nodes under one model.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 struct Group {
     region: usize,
     rows: Range<usize>,
     law: Law,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 enum Law {
+    /// Linear elasticity remembers nothing but the stress, which the stress nodes hold already.
     Elastic(Elastic),
-    Sand { material: Box<PM4Sand>, states: Vec<State> },
+    Plastic(Box<dyn Plastic>),
 }
 
 /// Outcome of one chunk of updates.
@@ -37,11 +37,84 @@ struct Outcome {
 }
 
 /// The soil models of a stage.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct SoilField {
     groups: Vec<Group>,
     outcomes: Vec<Outcome>,
     unit: Vec<()>,
+}
+
+/// The velocity field of a step, and what the force loop wants of it.
+#[derive(Clone, Copy)]
+struct Flowing<'a> {
+    geometry: &'a Geometry,
+    velocity: &'a [Vec2],
+    filter: f64,
+    dt: f64,
+}
+
+/// Rows under a model with a state, whichever it is: the call through the table is one for each group and step.
+trait Plastic: Debug + Send + Sync {
+    fn step(
+        &mut self,
+        threaded: bool,
+        flowing: Flowing<'_>,
+        first_row: usize,
+        rows: (&mut [StressPoint], &mut [NodalShare]),
+        outcomes: &mut [Outcome],
+        integrator: &Integrator,
+    );
+    fn points(&self) -> usize;
+    fn state_bytes(&self) -> usize;
+}
+
+#[derive(Debug)]
+struct Rowed<M: SoilModel> {
+    model: M,
+    states: Vec<M::State>,
+}
+
+impl<M: SoilModel> Plastic for Rowed<M> {
+    fn step(
+        &mut self,
+        threaded: bool,
+        flowing: Flowing<'_>,
+        first_row: usize,
+        (a, b): (&mut [StressPoint], &mut [NodalShare]),
+        outcomes: &mut [Outcome],
+        integrator: &Integrator,
+    ) {
+        let model = &self.model;
+        let Flowing { geometry, velocity, filter, dt } = flowing;
+        for_each_chunk(threaded, Rows { a, b, c: &mut self.states }, outcomes, |first, rows, outcome| {
+            *outcome = Outcome::default();
+            for k in 0..rows.a.len() {
+                let (point, state) = (&mut rows.a[k], &mut rows.c[k]);
+                let s = first_row + first + k;
+                let motion = motion(geometry, s, velocity);
+                let increment = motion.advance(&mut point.deformation, dt);
+                match bounded(&increment).and_then(|()| model.update(state, &increment, integrator)) {
+                    Ok(report) => outcome.report.merge(&report),
+                    Err(error) => {
+                        outcome.failure = Some((s, error));
+                        return;
+                    }
+                }
+                point.stress = model.stress(state);
+                set_moduli(point, model.moduli(state));
+                add_strain(point, &increment);
+                rows.b[k] = motion.share(point, geometry.covariance[s], filter);
+            }
+        });
+    }
+
+    fn points(&self) -> usize {
+        self.states.len()
+    }
+
+    fn state_bytes(&self) -> usize {
+        size_of_val(self.states.as_slice())
+    }
 }
 
 /// Largest strain component of one step: a thousand times what an earthquake does, and far below what plasticity
@@ -87,36 +160,26 @@ impl SoilField {
             let law =
                 law.map_err(|source| SolverError::Soil { region, node: rows.start / STRESS_NODES, source })?;
             for point in &mut points[rows] {
-                set_moduli(point, law.moduli());
+                set_moduli(point, law.constants());
             }
             Ok(Law::Elastic(law))
         })
     }
 
-    /// Shaking: every region's own model, sand initialised from the stress it has.
+    /// Shaking: every region's own model, its state made from the stress that is there.
     ///
     /// # Errors
     /// [`SolverError::Soil`] where a model refuses the stress.
     pub fn plastic(model: &Model, points: &mut [StressPoint]) -> Result<Self, SolverError> {
-        Self::build(model, |region, rows| match &model.regions[region].soil {
-            Soil::Elastic(elastic) => {
-                for point in &mut points[rows] {
-                    set_moduli(point, elastic.moduli());
-                }
-                Ok(Law::Elastic(elastic.clone()))
+        Self::build(model, |region, rows| {
+            let soil = &model.regions[region].soil;
+            let Soil::Elastic(elastic) = soil else {
+                return with_model!(soil, law => Ok(Law::Plastic(plastic_rows(law, region, rows, points)?)));
+            };
+            for point in &mut points[rows] {
+                set_moduli(point, elastic.constants());
             }
-            Soil::PM4Sand(material) => {
-                let mut states = Vec::with_capacity(rows.len());
-                for s in rows {
-                    let state = material
-                        .initialise(points[s].stress)
-                        .map_err(|source| SolverError::Soil { region, node: s / STRESS_NODES, source })?;
-                    points[s].stress = material.stress(&state);
-                    set_moduli(&mut points[s], material.moduli(&state));
-                    states.push(state);
-                }
-                Ok(Law::Sand { material: material.clone(), states })
-            }
+            Ok(Law::Elastic(elastic.clone()))
         })
     }
 
@@ -161,35 +224,15 @@ impl SoilField {
                             let s = first_row + first + k;
                             let motion = motion(geometry, s, velocity);
                             let increment = motion.advance(&mut point.deformation, dt);
-                            point.stress = elastic.update(&point.stress, &increment);
+                            point.stress = elastic.moved(&point.stress, &increment);
                             add_strain(point, &increment);
                             *share = motion.share(point, geometry.covariance[s], filter);
                         }
                     });
                 }
-                Law::Sand { material, states } => {
-                    for_each_chunk(threaded, Rows { a, b, c: states }, outcomes, |first, rows, outcome| {
-                        *outcome = Outcome::default();
-                        for k in 0..rows.a.len() {
-                            let (point, state) = (&mut rows.a[k], &mut rows.c[k]);
-                            let s = first_row + first + k;
-                            let motion = motion(geometry, s, velocity);
-                            let increment = motion.advance(&mut point.deformation, dt);
-                            let updated = bounded(&increment)
-                                .and_then(|()| material.update(state, &increment, integrator));
-                            match updated {
-                                Ok(report) => outcome.report.merge(&report),
-                                Err(error) => {
-                                    outcome.failure = Some((s, error));
-                                    return;
-                                }
-                            }
-                            point.stress = material.stress(state);
-                            set_moduli(point, material.moduli(state));
-                            add_strain(point, &increment);
-                            rows.b[k] = motion.share(point, geometry.covariance[s], filter);
-                        }
-                    });
+                Law::Plastic(law) => {
+                    let flowing = Flowing { geometry, velocity, filter, dt };
+                    law.step(threaded, flowing, first_row, (a, b), outcomes, integrator);
                     for outcome in outcomes.iter() {
                         if let Some((s, source)) = &outcome.failure {
                             let (region, node) = (group.region, s / STRESS_NODES);
@@ -203,18 +246,43 @@ impl SoilField {
         Ok(total)
     }
 
+    fn plastic_groups(&self) -> impl Iterator<Item = &dyn Plastic> {
+        self.groups.iter().filter_map(|group| match &group.law {
+            Law::Elastic(_) => None,
+            Law::Plastic(law) => Some(&**law),
+        })
+    }
+
     /// Stress nodes that run a plastic model.
     pub fn plastic_points(&self) -> usize {
-        self.groups
-            .iter()
-            .map(|group| if let Law::Sand { states, .. } = &group.law { states.len() } else { 0 })
-            .sum()
+        self.plastic_groups().map(Plastic::points).sum()
     }
 
     /// Bytes of the plastic models' history variables.
     pub fn state_bytes(&self) -> usize {
-        self.plastic_points() * size_of::<State>()
+        self.plastic_groups().map(Plastic::state_bytes).sum()
     }
+}
+
+/// States of one region's rows, and the stress and stiffness they give their points.
+fn plastic_rows<M: SoilModel + 'static>(
+    law: &M,
+    region: usize,
+    rows: Range<usize>,
+    points: &mut [StressPoint],
+) -> Result<Box<dyn Plastic>, SolverError> {
+    let mut states = Vec::with_capacity(rows.len());
+    for s in rows {
+        let state = law.initialise(points[s].stress, None).map_err(|source| SolverError::Soil {
+            region,
+            node: s / STRESS_NODES,
+            source,
+        })?;
+        points[s].stress = law.stress(&state);
+        set_moduli(&mut points[s], law.moduli(&state));
+        states.push(state);
+    }
+    Ok(Box::new(Rowed { model: law.clone(), states }))
 }
 
 fn set_moduli(point: &mut StressPoint, moduli: Moduli) {

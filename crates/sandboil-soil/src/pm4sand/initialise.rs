@@ -17,16 +17,11 @@ const P_ZP_SEED: f64 = 0.01;
 const FABRIC_LIMIT_MAX: f64 = 20.0;
 
 impl PM4Sand {
-    /// State at a given effective stress (kPa, tension positive, space axes), zero strain, void ratio of `Dr`.
+    /// State at a given effective stress (kPa, tension positive, space axes) and void ratio, at zero strain.
     ///
     /// A stress below `p_min` or outside the surfaces is replaced by the nearest admissible one; the difference is
-    /// kept as an offset that [`PM4Sand::stress`] adds, so the host keeps its equilibrium.
-    pub fn initialise(&self, stress: Stress) -> Result<State, SoilError> {
-        self.initialise_with_void_ratio(stress, self.constants.initial_void_ratio())
-    }
-
-    /// As [`PM4Sand::initialise`], with the void ratio at zero strain given (for example after consolidation).
-    pub fn initialise_with_void_ratio(&self, stress: Stress, void_ratio: f64) -> Result<State, SoilError> {
+    /// kept as an offset that is added to what the host reads, so the host keeps its equilibrium.
+    pub(super) fn first_state(&self, stress: Stress, void_ratio: f64) -> Result<State, SoilError> {
         if !(void_ratio > 0.0 && void_ratio.is_finite()) {
             return Err(SoilError::InvalidParameter {
                 name: "void_ratio",
@@ -108,16 +103,5 @@ impl PM4Sand {
             2.5 * ((0.5 * bounding).asin() - (0.5 * self.constants.critical_ratio).asin())
                 / (bounding - dilatancy)
         }
-    }
-
-    /// Shear modulus of unsheared ground at an effective stress (kPa, tension positive): the initial modulus
-    /// with its stress-ratio factor, kPa. For the impedance of a base.
-    pub fn small_strain_shear_modulus(&self, stress: &Stress) -> f64 {
-        let c = &self.constants;
-        let p = -0.5 * (stress.xx + stress.yy);
-        let s = Deviator { half_difference: -0.5 * (stress.xx - stress.yy), xy: -stress.xy };
-        let p_min = P_MIN_FRACTION * p.max(c.p_atm);
-        let surfaces = self.surfaces(p.max(p_min), c.initial_void_ratio());
-        self.elastic_moduli(p, s, p_min, surfaces.bounding, 1.0).shear
     }
 }

@@ -19,18 +19,26 @@ mod surfaces;
 pub use parameters::{Constants, Options, PM4Sand, Parameters};
 pub use state::State;
 
-use crate::{Deviator, Integrator, Moduli, SoilError, StrainIncrement, Stress, UpdateReport, error::finite};
+use crate::{
+    Deviator, Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport, error::finite,
+};
 use state::Strain;
 
 /// Largest strain component accepted in one increment: 1000 %, beyond which no path means anything.
 const MAX_STRAIN_INCREMENT: f64 = 10.0;
 
-impl PM4Sand {
+impl SoilModel for PM4Sand {
+    type State = State;
+
+    fn initialise(&self, stress: Stress, void_ratio: Option<f64>) -> Result<State, SoilError> {
+        self.first_state(stress, void_ratio.unwrap_or_else(|| self.constants.initial_void_ratio()))
+    }
+
     /// Moves a state through a strain increment. On error the state is unchanged.
     ///
     /// Errors: [`SoilError::NonFinite`] for an increment or a result that is not finite,
     /// [`SoilError::StrainIncrementTooLarge`] above 1000 %.
-    pub fn update(
+    fn update(
         &self,
         state: &mut State,
         de: &StrainIncrement,
@@ -64,7 +72,7 @@ impl PM4Sand {
     }
 
     /// Effective stress in space axes, kPa, tension positive, the offset stress of an inadmissible start included.
-    pub fn stress(&self, state: &State) -> Stress {
+    fn stress(&self, state: &State) -> Stress {
         let mean = state.mean + state.offset.mean;
         let mut deviator = state.deviator + state.offset.deviator;
         if state.rotation != 0.0 {
@@ -78,14 +86,17 @@ impl PM4Sand {
         }
     }
 
-    /// Elastic moduli of the last commit, kPa.
-    pub fn moduli(&self, state: &State) -> Moduli {
+    /// Those of the last commit.
+    fn moduli(&self, state: &State) -> Moduli {
         state.moduli
     }
 
-    /// Void ratio.
-    pub fn void_ratio(&self, state: &State) -> f64 {
-        state.void_ratio_at(state.volumetric_strain)
+    fn static_shear_modulus(&self) -> f64 {
+        self.constants.g0 * self.constants.p_atm
+    }
+
+    fn void_ratio(&self, state: &State) -> Option<f64> {
+        Some(state.void_ratio_at(state.volumetric_strain))
     }
 }
 

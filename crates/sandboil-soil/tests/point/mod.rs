@@ -8,7 +8,7 @@
 )]
 
 use sandboil_soil::pm4sand::{Options, PM4Sand, Parameters, State};
-use sandboil_soil::{Integrator, StrainIncrement, Stress, UpdateReport};
+use sandboil_soil::{Integrator, SoilModel, StrainIncrement, Stress, UpdateReport};
 
 /// Relative density, shear modulus coefficient, contraction rate of the three generic calibrations (Boulanger and
 /// Ziotopoulou 2017, for 6, 14 and 26 blows).
@@ -55,7 +55,7 @@ pub fn consolidated(sand: &PM4Sand) -> State {
     let mean = 0.75 * SIGMA_V0;
     let strain = mean / (3.0 * c.g0 * c.p_atm);
     let e0 = c.initial_void_ratio();
-    sand.initialise_with_void_ratio(anisotropic(), e0 - (1.0 + e0) * strain).unwrap()
+    sand.initialise(anisotropic(), Some(e0 - (1.0 + e0) * strain)).unwrap()
 }
 
 /// Equal parts of `increment`, none with a component above `largest`.
@@ -122,7 +122,7 @@ impl StrainPath {
     /// State at the first row.
     pub fn start(&self, sand: &PM4Sand) -> State {
         let [xx, yy, xy] = self.rows[0].stress;
-        sand.initialise(Stress { xx, yy, xy, zz: xx }).unwrap()
+        sand.initialise(Stress { xx, yy, xy, zz: xx }, None).unwrap()
     }
 
     /// Strain increments from row to row, each with the row it leads to.

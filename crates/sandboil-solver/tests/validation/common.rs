@@ -1,9 +1,9 @@
 //! Columns that several test files build.
 
-use sandboil_soil::{Integrator, elastic::Elastic};
+use sandboil_soil::{Integrator, Soil, elastic::Elastic};
 use sandboil_solver::{
-    AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, SHAKING_FACTOR, Shaking, Soil,
-    UpgoingWave, Water, stress_node_offset,
+    AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, SHAKING_FACTOR, Shaking, UpgoingWave,
+    Water, stress_node_offset,
 };
 use sandboil_sph::{Period, Vec2};
 

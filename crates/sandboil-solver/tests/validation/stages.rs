@@ -1,8 +1,11 @@
 //! Switches between stages: what gravity leaves, that the compliant base starts nothing, and that shaking goes on.
 
 use crate::common::{column, elastic, shaking};
-use sandboil_soil::pm4sand::{Options, PM4Sand, Parameters};
-use sandboil_solver::{Gravity, Model, Operators, Simulation, Soil, UpgoingWave, Water};
+use sandboil_soil::{
+    Soil,
+    pm4sand::{Options, PM4Sand, Parameters},
+};
+use sandboil_solver::{Gravity, Model, Operators, Simulation, UpgoingWave, Water};
 use std::f64::consts::PI;
 
 const HEIGHT: f64 = 10.0;
