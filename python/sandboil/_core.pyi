@@ -1,5 +1,6 @@
 """The numerical core. Private: arrays in and out, tension positive. Users take `sandboil.Simulation`."""
 
+from collections.abc import Sequence
 from typing import Any, final
 
 import numpy as np
@@ -8,7 +9,10 @@ from numpy.typing import NDArray
 __all__ = [
     "ACCELERATION_TERM_CONDUCTIVITY",
     "Simulation",
+    "Specimen",
     "__version__",
+    "carries",
+    "pm4sand_constants",
     "small_strain_moduli",
     "stress_node_offset",
 ]
@@ -19,6 +23,10 @@ ACCELERATION_TERM_CONDUCTIVITY: float
 def small_strain_moduli(
     material: dict[str, Any], stress: tuple[float, float, float, float]
 ) -> tuple[float, float]: ...
+def carries(material: dict[str, Any], stress: tuple[float, float, float, float]) -> bool: ...
+def pm4sand_constants(
+    material: dict[str, Any], stress: tuple[float, float, float, float]
+) -> dict[str, float]: ...
 def stress_node_offset(dx: float, dy: float) -> tuple[float, float]: ...
 
 @final
@@ -57,3 +65,48 @@ class Simulation:
     def channel_names(self) -> list[str]: ...
     def finish_histories(self) -> None: ...
     def take_histories(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+
+@final
+class Specimen:
+    def __new__(
+        cls,
+        material: object,
+        stress: tuple[float, float, float, float],
+        void_ratio: float | None,
+        *,
+        scheme: str,
+        tolerance: float | None = None,
+        max_increment: float | None = None,
+    ) -> Specimen: ...
+    def shear(
+        self,
+        turns: Sequence[tuple[str, float]],
+        *,
+        drained: bool,
+        count: int | None = None,
+        strain_step: float,
+        strain_limit: float,
+        stress_resolution: float,
+        strain_resolution: float,
+    ) -> tuple[dict[str, NDArray[Any]], str]: ...
+    def path(
+        self,
+        rows: NDArray[np.float64],
+        *,
+        by_stress: tuple[bool, bool, bool],
+        strain_step: float,
+        stress_resolution: float,
+        strain_resolution: float,
+    ) -> tuple[dict[str, NDArray[Any]], str]: ...
+    def reconsolidate(self) -> bool: ...
+    @property
+    def stress(self) -> tuple[float, float, float, float]: ...
+    @property
+    def strain(self) -> tuple[float, float, float]: ...
+    @property
+    def moduli(self) -> tuple[float, float]: ...
+    @property
+    def void_ratio(self) -> float | None: ...
+    @property
+    def plastic_shear_strain(self) -> float | None: ...
+    def report(self) -> dict[str, int]: ...

@@ -1,6 +1,7 @@
 //! Private binding module `sandboil._core`: converts, calls, converts.
 
 mod errors;
+mod laboratory;
 mod material;
 mod simulation;
 
@@ -9,6 +10,8 @@ mod simulation;
 mod _core {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use crate::laboratory::{Specimen, carries, pm4sand_constants};
     #[pymodule_export]
     use crate::material::small_strain_moduli;
     #[pymodule_export]

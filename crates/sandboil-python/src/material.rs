@@ -9,7 +9,8 @@ use sandboil_soil::{
 };
 use sandboil_solver::SolverError;
 
-fn refused(error: &SoilError) -> PyErr {
+/// A refusal of the soil crate as the exception that tells it.
+pub fn refused(error: &SoilError) -> PyErr {
     match *error {
         SoilError::InvalidParameter { name, value, expected } => {
             CoreError(SolverError::InvalidInput { name, value, expected }).into()

@@ -28,6 +28,9 @@ pub enum SoilError {
         /// Largest one accepted.
         limit: f64,
     },
+    /// What a model that is not ours says of its failure.
+    #[error("{0}")]
+    Outside(String),
 }
 
 /// Refuses a number that is infinite or not a number.

@@ -6,6 +6,7 @@
 pub mod elastic;
 mod error;
 mod integrator;
+pub mod laboratory;
 mod model;
 pub mod pm4sand;
 mod report;

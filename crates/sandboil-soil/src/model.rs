@@ -57,6 +57,17 @@ pub trait SoilModel: Clone + Debug + Send + Sync {
     fn plastic_shear_strain(&self, _state: &Self::State) -> Option<f64> {
         None
     }
+
+    /// Whether the model can carry a stress as it is, so that [`SoilModel::initialise`] replaces nothing.
+    fn carries(&self, _stress: &Stress) -> bool {
+        true
+    }
+
+    /// The model for reconsolidation after shaking, and the state made ready for it; `None` where that makes no
+    /// difference.
+    fn reconsolidating(&self, _state: &mut Self::State) -> Option<Self> {
+        None
+    }
 }
 
 /// A soil model as one region uses it.
@@ -114,6 +125,14 @@ impl<M: SoilModel> SoilModel for Box<M> {
 
     fn plastic_shear_strain(&self, state: &Self::State) -> Option<f64> {
         (**self).plastic_shear_strain(state)
+    }
+
+    fn carries(&self, stress: &Stress) -> bool {
+        (**self).carries(stress)
+    }
+
+    fn reconsolidating(&self, state: &mut Self::State) -> Option<Self> {
+        (**self).reconsolidating(state).map(Box::new)
     }
 }
 

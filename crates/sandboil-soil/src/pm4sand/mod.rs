@@ -18,6 +18,7 @@ mod surfaces;
 
 pub use parameters::{Constants, Options, PM4Sand, Parameters};
 pub use state::State;
+pub use surfaces::Surfaces;
 
 use crate::{
     Deviator, Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport, error::finite,
@@ -97,6 +98,17 @@ impl SoilModel for PM4Sand {
 
     fn void_ratio(&self, state: &State) -> Option<f64> {
         Some(state.void_ratio_at(state.volumetric_strain))
+    }
+
+    /// Inside the larger of bounding and dilatancy surface, and not below the smallest pressure.
+    fn carries(&self, stress: &Stress) -> bool {
+        self.first_state(*stress, self.constants.initial_void_ratio()).is_ok_and(|state| !state.has_offset())
+    }
+
+    fn reconsolidating(&self, state: &mut State) -> Option<Self> {
+        let sand = self.clone().with_options(Options { post_shaking: true, ..self.options });
+        sand.refresh_moduli(state);
+        Some(sand)
     }
 }
 

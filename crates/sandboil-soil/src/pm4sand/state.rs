@@ -109,6 +109,11 @@ impl State {
         self.void_ratio_initial - (1.0 + self.void_ratio_initial) * volumetric_strain
     }
 
+    /// Whether the initial stress was inadmissible and is made up for by a constant offset.
+    pub fn has_offset(&self) -> bool {
+        self.offset.mean != 0.0 || self.offset.deviator != Deviator::ZERO
+    }
+
     /// In-plane mean effective stress p = (xx + yy)/2 of the model, kPa, compression positive.
     pub fn mean_stress(&self) -> f64 {
         self.mean
@@ -132,6 +137,16 @@ impl State {
     /// Cumulative fabric.
     pub fn cumulative_fabric(&self) -> f64 {
         self.fabric_cumulative
+    }
+
+    /// Fabric limit `z_max`.
+    pub fn fabric_limit(&self) -> f64 {
+        self.fabric_limit
+    }
+
+    /// Dilatancy scale `A_do`.
+    pub fn dilatancy_scale(&self) -> f64 {
+        self.dilatancy_scale
     }
 
     /// Lower limit of the pressure used in the formulas, kPa; the mean stress itself never falls below a fifth of it.

@@ -15,9 +15,12 @@ const TINY: f64 = 1e-10;
 
 /// Stress ratios `q/p` on the bounding and the dilatancy surface, and the state index they follow from.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Surfaces {
+pub struct Surfaces {
+    /// Relative state parameter index, negative when dense of critical.
     pub state_index: f64,
+    /// Bounding ratio `M^b`.
     pub bounding: f64,
+    /// Dilatancy ratio `M^d`.
     pub dilatancy: f64,
 }
 
@@ -28,6 +31,11 @@ fn fourth(x: f64) -> f64 {
 }
 
 impl PM4Sand {
+    /// The surfaces at a state's pressure and void ratio.
+    pub fn surfaces_of(&self, state: &State) -> Surfaces {
+        self.surfaces(state.mean.max(state.p_min), state.void_ratio_at(state.volumetric_strain))
+    }
+
     /// Bounding and dilatancy stress ratios for the relative state parameter index, negative when dense of
     /// critical (Bolton 1986; manual, sections 3.2 and 3.3). `p` is already limited below by `p_min`.
     #[inline]

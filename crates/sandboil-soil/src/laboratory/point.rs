@@ -1,0 +1,79 @@
+//! A model with its state, whichever model it is: the laboratory drives every one through the same table of calls.
+
+use crate::{Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport};
+
+/// A soil at one point. Trials are made from a mark and taken back to it.
+pub trait Point: Send + Sync {
+    /// Remembers the present state as the one that [`Point::back`] returns to.
+    fn mark(&mut self);
+    /// Returns to the marked state.
+    fn back(&mut self);
+    /// Moves through a strain increment.
+    ///
+    /// # Errors
+    /// As [`SoilModel::update`].
+    fn update(&mut self, de: &StrainIncrement, integrator: &Integrator) -> Result<UpdateReport, SoilError>;
+    /// Effective stress, kPa, tension positive.
+    fn stress(&self) -> Stress;
+    /// Present elastic moduli, kPa.
+    fn moduli(&self) -> Moduli;
+    /// Void ratio, if the model knows it.
+    fn void_ratio(&self) -> Option<f64>;
+    /// Accumulated plastic shear strain, if the model keeps it.
+    fn plastic_shear_strain(&self) -> Option<f64>;
+    /// Switches to reconsolidation after shaking; returns whether the model makes a difference.
+    fn reconsolidate(&mut self) -> bool;
+}
+
+/// A [`SoilModel`] with a state of it.
+pub(super) struct ModelPoint<M: SoilModel> {
+    model: M,
+    state: M::State,
+    marked: M::State,
+}
+
+impl<M: SoilModel> ModelPoint<M> {
+    pub(super) fn new(model: M, state: M::State) -> Self {
+        Self { model, state, marked: state }
+    }
+}
+
+impl<M: SoilModel> Point for ModelPoint<M> {
+    fn mark(&mut self) {
+        self.marked = self.state;
+    }
+
+    fn back(&mut self) {
+        self.state = self.marked;
+    }
+
+    fn update(&mut self, de: &StrainIncrement, integrator: &Integrator) -> Result<UpdateReport, SoilError> {
+        self.model.update(&mut self.state, de, integrator)
+    }
+
+    fn stress(&self) -> Stress {
+        self.model.stress(&self.state)
+    }
+
+    fn moduli(&self) -> Moduli {
+        self.model.moduli(&self.state)
+    }
+
+    fn void_ratio(&self) -> Option<f64> {
+        self.model.void_ratio(&self.state)
+    }
+
+    fn plastic_shear_strain(&self) -> Option<f64> {
+        self.model.plastic_shear_strain(&self.state)
+    }
+
+    fn reconsolidate(&mut self) -> bool {
+        match self.model.reconsolidating(&mut self.state) {
+            Some(model) => {
+                self.model = model;
+                true
+            }
+            None => false,
+        }
+    }
+}

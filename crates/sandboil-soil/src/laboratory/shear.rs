@@ -1,0 +1,235 @@
+//! Direct simple shear to turning points: no lateral strain, and either constant volume or a held vertical stress.
+
+use super::{
+    Ending, Record, Specimen,
+    control::{Compliance, Failure, Prescribed},
+};
+
+/// Trials for the share of an increment that ends at a turn.
+const TURN_TRIALS: usize = 60;
+/// Allowed difference of the shear stress from its turning point, over the distance between turns.
+const TURN_TOLERANCE: f64 = 1e-9;
+/// Smallest part of the strain step that is still tried where the vertical stress is not met.
+const SMALLEST_STEP: f64 = 1e-5;
+/// Increments between looks at whether the caller wants to stop.
+const STEPS_PER_LOOK: u32 = 1024;
+
+/// Where shear turns back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Turn {
+    /// At this shear stress, kPa.
+    Stress(f64),
+    /// At this shear strain (engineering, total).
+    Strain(f64),
+}
+
+/// The sequence of turns.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Turns {
+    /// One after the other.
+    Each(Vec<Turn>),
+    /// Two in alternation, this many in all.
+    Alternating {
+        /// First, third, fifth...
+        odd: Turn,
+        /// Second, fourth...
+        even: Turn,
+        /// Number of turns.
+        count: usize,
+    },
+}
+
+impl Turns {
+    fn get(&self, index: usize) -> Option<Turn> {
+        match self {
+            Self::Each(turns) => turns.get(index).copied(),
+            Self::Alternating { odd, even, count } => {
+                (index < *count).then_some(if index.is_multiple_of(2) { *odd } else { *even })
+            }
+        }
+    }
+}
+
+/// A direct simple shear test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shear {
+    /// Vertical effective stress held (drained), or volume held (undrained, constant volume).
+    pub drained: bool,
+    /// Where to turn.
+    pub turns: Turns,
+    /// Shear strain of one increment.
+    pub strain_step: f64,
+    /// Largest distance of the shear strain from its value at the start; beyond it the test ends.
+    pub strain_limit: f64,
+}
+
+/// One leg from turn to turn.
+struct Leg {
+    turn: Turn,
+    direction: f64,
+    /// Value at the last turn of the quantity that is turned.
+    from: f64,
+    begun: f64,
+    length: f64,
+    turns: usize,
+}
+
+impl Leg {
+    fn value(&self, specimen: &Specimen) -> f64 {
+        match self.turn {
+            Turn::Stress(_) => specimen.stress().xy,
+            Turn::Strain(_) => specimen.strain[2],
+        }
+    }
+
+    fn target(&self) -> f64 {
+        match self.turn {
+            Turn::Stress(value) | Turn::Strain(value) => value,
+        }
+    }
+
+    /// Cycles at the present value. Soil may soften on the way: cycles never go back beyond the last turn.
+    fn cycle(&self, value: f64) -> f64 {
+        let distance = self.target() - self.from;
+        let share = if distance == 0.0 { 1.0 } else { ((value - self.from) / distance).clamp(0.0, 1.0) };
+        self.begun + share * self.length
+    }
+}
+
+impl Specimen {
+    /// Shears the specimen from turn to turn. The record gets its present state if it is empty, and every turn.
+    pub fn shear(&mut self, test: &Shear, record: &mut Record, stop: &mut dyn FnMut() -> bool) -> Ending {
+        if record.rows().is_empty() {
+            record.keep(self.row(0.0, 0));
+        }
+        let start = self.strain[2];
+        let vertical = self.stress().yy;
+        let prescribed = Prescribed { by_stress: [false, test.drained, false], stress: [0.0, vertical, 0.0] };
+        let mut compliance = Compliance::elastic(self.point.moduli(), prescribed.by_stress);
+        let mut turns = 0;
+        while let Some(turn) = test.turns.get(turns) {
+            let mut leg = Leg {
+                turn,
+                direction: 1.0,
+                from: 0.0,
+                begun: if turns == 0 { 0.0 } else { 0.5 * turns as f64 - 0.25 },
+                length: if turns == 0 { 0.25 } else { 0.5 },
+                turns,
+            };
+            leg.from = leg.value(self);
+            leg.direction = (leg.target() - leg.from).signum();
+            let ending = self.shear_leg(test, &leg, start, &prescribed, &mut compliance, record, stop);
+            if ending != Ending::Complete {
+                record.keep(self.row(leg.cycle(leg.value(self)), turns));
+                return ending;
+            }
+            turns += 1;
+            record.keep(self.row(leg.begun + leg.length, turns));
+        }
+        Ending::Complete
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "the context of one leg")]
+    fn shear_leg(
+        &mut self,
+        test: &Shear,
+        leg: &Leg,
+        start: f64,
+        prescribed: &Prescribed,
+        compliance: &mut Compliance,
+        record: &mut Record,
+        stop: &mut dyn FnMut() -> bool,
+    ) -> Ending {
+        if test.drained {
+            *compliance = Compliance::elastic(self.point.moduli(), prescribed.by_stress);
+        }
+        let tolerance = TURN_TOLERANCE * (leg.target() - leg.from).abs();
+        let (mut step, mut vertical_slope, mut steps) = (test.strain_step, 0.0, 0_u32);
+        while leg.direction * (leg.target() - leg.value(self)) > tolerance {
+            steps = steps.wrapping_add(1);
+            if steps.is_multiple_of(STEPS_PER_LOOK) && stop() {
+                return Ending::Interrupted;
+            }
+            let size = match leg.turn {
+                Turn::Strain(value) => step.min((value - self.strain[2]).abs()),
+                Turn::Stress(_) => step,
+            };
+            let made = self.shear_increment(leg, size, tolerance, vertical_slope, prescribed, compliance);
+            match made {
+                Ok([_, vertical, shear]) => {
+                    vertical_slope = vertical / shear;
+                    step = (2.0 * step).min(test.strain_step);
+                }
+                Err(Failure::Refused(error)) if !test.drained => return Ending::Refused(error),
+                Err(_) if step > SMALLEST_STEP * test.strain_step => {
+                    step *= 0.25;
+                    vertical_slope = 0.0;
+                    *compliance = Compliance::elastic(self.point.moduli(), prescribed.by_stress);
+                    continue;
+                }
+                Err(Failure::Refused(error)) => return Ending::Refused(error),
+                Err(Failure::NotMet) => {
+                    let reached = self.stress();
+                    let wanted = crate::Stress { yy: prescribed.stress[1], ..reached };
+                    return Ending::StressNotCarried { wanted, reached };
+                }
+            }
+            let value = leg.value(self);
+            if leg.direction * (leg.target() - value) > tolerance {
+                record.offer(self.row(leg.cycle(value), leg.turns));
+            }
+            if (self.strain[2] - start).abs() > test.strain_limit {
+                return Ending::StrainLimit;
+            }
+        }
+        Ending::Complete
+    }
+
+    /// One increment towards the turn; an increment that passes a turning stress is shortened to end at it.
+    fn shear_increment(
+        &mut self,
+        leg: &Leg,
+        size: f64,
+        tolerance: f64,
+        vertical_slope: f64,
+        prescribed: &Prescribed,
+        compliance: &mut Compliance,
+    ) -> Result<[f64; 3], Failure> {
+        let before = (self.strain, leg.value(self));
+        let guess = |share: f64| {
+            let shear = leg.direction * share * size;
+            [0.0, vertical_slope * shear, shear]
+        };
+        let mut made = self.increment(guess(1.0), prescribed, compliance)?;
+        let Turn::Stress(target) = leg.turn else { return Ok(made) };
+        let excess = |specimen: &Self| leg.direction * (leg.value(specimen) - target);
+        let (mut low, mut excess_low) = (0.0, leg.direction * (before.1 - target));
+        let (mut high, mut excess_high) = (1.0, excess(self));
+        if excess_high <= tolerance {
+            return Ok(made);
+        }
+        // Illinois variant of regula falsi on the share of the increment.
+        let mut last_was_high = true;
+        for _ in 0..TURN_TRIALS {
+            let share = (low * excess_high - high * excess_low) / (excess_high - excess_low);
+            self.point.back();
+            self.strain = before.0;
+            made = self.increment(guess(share), prescribed, compliance)?;
+            let found = excess(self);
+            if found.abs() <= tolerance {
+                break;
+            }
+            let is_high = found > 0.0;
+            if is_high {
+                (high, excess_high) = (share, found);
+            } else {
+                (low, excess_low) = (share, found);
+            }
+            if is_high == last_was_high {
+                *(if is_high { &mut excess_low } else { &mut excess_high }) *= 0.5;
+            }
+            last_was_high = is_high;
+        }
+        Ok(made)
+    }
+}
