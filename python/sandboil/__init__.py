@@ -4,6 +4,7 @@ Stress-particle SPH with coupled pore water and PM4Sand. Units kN, m, s, Mg; x h
 pressures reported to people are positive in compression. Start with :class:`Scene` and :func:`run`.
 """
 
+from . import lab
 from ._core import __version__
 from ._errors import InvalidInput, RunInterrupted, SandboilError, SimulationDiverged
 from .discretise import Discretisation, discretise
@@ -64,6 +65,7 @@ __all__ = [
     "__version__",
     "box",
     "discretise",
+    "lab",
     "load",
     "polygon",
     "response_spectrum",

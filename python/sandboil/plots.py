@@ -10,7 +10,6 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -18,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ._errors import InvalidInput
+from ._style import DPI, INPUT, OURS, REFERENCE, STYLE
 from .discretise import Floats
 from .motion import Motion
 from .motion._motion import SIGNIFICANT
@@ -27,21 +27,9 @@ from .scene import Shaking
 
 FOLDER = "plots"
 
-# Colours that the colour-blind tell apart (Okabe and Ito 2008): ours, the input's, and the reference's.
-_OURS, _INPUT, _REFERENCE = "#0072B2", "#999999", "#D55E00"
 _COLUMN_TIMES = 6
 # Width of the sway over the height of the column in its picture, before the factor is rounded.
 _SWAY_SHARE = 0.6
-_DPI = 150
-_STYLE: dict[Any, Any] = {
-    "font.size": 9.0,
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "lines.linewidth": 1.0,
-}
 
 
 @dataclass(frozen=True)
@@ -103,7 +91,7 @@ def plot(
     InvalidInput : a run without shaking, a folder that cannot be written
     """
     stage = _shaken_stage(run, stage)
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figures = {"surface": surface(run, reference=reference, stage=stage)}
         if run.scene.water is not None and run.scene.output.depths:
             figures["pore_pressure"] = pore_pressure(run, reference=reference, stage=stage)
@@ -116,7 +104,7 @@ def plot(
             target.mkdir(parents=True, exist_ok=True)
             for name, figure in figures.items():
                 paths.append(target / f"{name}.png")
-                figure.savefig(paths[-1], dpi=_DPI)
+                figure.savefig(paths[-1], dpi=DPI)
         except OSError as error:
             raise InvalidInput("folder", str(target), f"must be writable: {error}") from error
     return paths
@@ -152,30 +140,30 @@ def surface(run: Run, *, reference: Reference | None = None, stage: str | None =
     if 0.5 / dt > PGA_CORNER:
         smooth = np.abs(butterworth(history.values, dt, None, PGA_CORNER, PGA_ORDER)).max()
         label += f" (below {PGA_CORNER:g} Hz: {smooth:.3f} g)"
-    top.plot(history.time, history.values, color=_OURS, label=label)
+    top.plot(history.time, history.values, color=OURS, label=label)
     if reference is not None:
         values = _column_of(reference.histories, "acc_surface_g")
         label = f"reference, peak {np.abs(values).max():.3f} g"
         top.plot(
-            _column_of(reference.histories, "time_s"), values, color=_REFERENCE, lw=0.7, ls="--", label=label
+            _column_of(reference.histories, "time_s"), values, color=REFERENCE, lw=0.7, ls="--", label=label
         )
     top.set(ylabel="horizontal acceleration, g", xlim=(0.0, history.time[-1]))
     top.legend(loc="upper right")
     if motion is not None:
         label = f"{motion.kind} motion, peak {motion.pga_g:.3f} g"
-        bottom.plot(motion.time, motion.acceleration_g, color=_INPUT, lw=0.7, label=label)
+        bottom.plot(motion.time, motion.acceleration_g, color=INPUT, lw=0.7, label=label)
         bottom.legend(loc="upper right")
     bottom.set(xlabel="time, s", ylabel="acceleration, g", xlim=(0.0, history.time[-1]))
 
     spectrum = run.spectrum(stage=stage)
-    right.semilogx(spectrum.periods, spectrum.psa_g, color=_OURS, label="surface", zorder=3)
+    right.semilogx(spectrum.periods, spectrum.psa_g, color=OURS, label="surface", zorder=3)
     if motion is not None:
         shaken = motion.response_spectrum()
-        right.semilogx(shaken.periods, shaken.psa_g, color=_INPUT, label=f"{motion.kind} motion")
+        right.semilogx(shaken.periods, shaken.psa_g, color=INPUT, label=f"{motion.kind} motion")
     if reference is not None:
         periods = _column_of(reference.spectrum, "period_s")
         values = _column_of(reference.spectrum, "psa_surface_g_5pct")
-        right.semilogx(periods, values, color=_REFERENCE, ls="--", label="reference, surface")
+        right.semilogx(periods, values, color=REFERENCE, ls="--", label="reference, surface")
     right.set(
         xlabel="period, s",
         ylabel=f"pseudo-acceleration, {100 * spectrum.damping:g} % damping, g",
@@ -195,11 +183,11 @@ def pore_pressure(run: Run, *, reference: Reference | None = None, stage: str | 
     panels = figure.subplots(len(depths), 1, sharex=True, squeeze=False)[:, 0]
     for axes, depth in zip(panels, depths, strict=True):
         history = run.history("r_u", depth=depth, stage=stage)
-        axes.plot(history.time, history.values, color=_OURS, label="sandboil", zorder=3)
+        axes.plot(history.time, history.values, color=OURS, label="sandboil", zorder=3)
         name = f"ru_{depth:g}m"
         if reference is not None and name in reference.histories:
             time = _column_of(reference.histories, "time_s")
-            axes.plot(time, reference.histories[name], color=_REFERENCE, ls="--", label="reference", zorder=4)
+            axes.plot(time, reference.histories[name], color=REFERENCE, ls="--", label="reference", zorder=4)
         axes.axhline(1.0, color="black", lw=0.6, ls=":")
         axes.set(ylabel="$r_u$", ylim=(min(0.0, history.values.min()), max(1.1, history.values.max())))
         axes.set_title(f"{depth:g} m below the surface", loc="left", fontsize=9)
@@ -299,10 +287,10 @@ def stress_paths(run: Run, *, reference: Reference | None = None, stage: str | N
                 _column_of(reference.stress_strain, f"{name}_{depth:g}m")
                 for name in ("tau_kPa", "sv_eff_kPa", "gamma")
             )
-            left.plot(their_sigma, their_tau, color=_REFERENCE, lw=0.6, label="reference")
-            right.plot(100.0 * their_gamma, their_tau, color=_REFERENCE, lw=0.6, label="reference")
-        left.plot(sigma, tau, color=_OURS, lw=0.7, label="sandboil")
-        right.plot(100.0 * gamma, tau, color=_OURS, lw=0.7, label="sandboil")
+            left.plot(their_sigma, their_tau, color=REFERENCE, lw=0.6, label="reference")
+            right.plot(100.0 * their_gamma, their_tau, color=REFERENCE, lw=0.6, label="reference")
+        left.plot(sigma, tau, color=OURS, lw=0.7, label="sandboil")
+        right.plot(100.0 * gamma, tau, color=OURS, lw=0.7, label="sandboil")
         left.set(xlabel="vertical effective stress, kPa", ylabel="shear stress, kPa", xlim=(0.0, None))
         right.set(xlabel="shear strain, %", ylabel="shear stress, kPa")
         left.set_title(f"{depth:g} m below the surface", loc="left", fontsize=9)

@@ -1,0 +1,112 @@
+"""The arguments of the tests: their kinds, and the check of all of them before any work is done."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import typing
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field, PlainValidator, create_model
+
+from .._model import Model, Number
+from ..discretise import Floats
+from . import _specimen
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+# Largest integrator tolerance at which cycle counts are unbiased (docs/theory/pm4sand.md), as in a scene.
+_TOLERANCE_MAX = 1.0e-4
+# Largest shear or axial strain of a test: beyond it an element is no element any more.
+_STRAIN_MAX = 1.0
+
+
+def _finite(value: object, dimensions: int, shape: str) -> Floats:
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"must be numbers in {shape}") from None
+    if array.ndim != dimensions or array.size == 0:
+        raise ValueError(f"must have {shape}, not {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError("must be finite throughout")
+    return array
+
+
+def _as_series(value: object) -> Floats:
+    return _finite(value, 1, "shape (n,), n at least 1")
+
+
+def _as_path(value: object) -> Floats:
+    array = _finite(value, 2, "shape (n, 3), n at least 1")
+    if array.shape[1] != 3:
+        raise ValueError(f"must have shape (n, 3), not {array.shape}")
+    return array
+
+
+def _as_stress(value: object) -> Floats:
+    array = _finite(value, 1, "3 or 4 components xx, yy, xy and zz")
+    if len(array) not in (3, 4):
+        raise ValueError(f"must have 3 or 4 components xx, yy, xy and zz, not {len(array)}")
+    return array
+
+
+Soil = Annotated[_specimen.Soil, PlainValidator(_specimen.as_soil)]
+Pressure = Annotated[
+    Number, Field(gt=0.0, description="vertical effective stress, kPa, compression positive")
+]
+EarthPressure = Annotated[Number, Field(gt=0.0, description="horizontal over vertical effective stress")]
+Ratio = Annotated[Number, Field(gt=0.0, description="cyclic shear stress over sigma_v0")]
+Bias = Annotated[Number, Field(description="static shear stress over sigma_v0")]
+VoidRatio = Annotated[Number, Field(gt=0.0, description="void ratio at the start of the test")] | None
+Limit = Annotated[
+    Number,
+    Field(
+        gt=0.0,
+        le=_STRAIN_MAX,
+        description="a strain, 1",
+        json_schema_extra={"remedy": "it is a fraction, not a percentage: 5 % is written 0.05"},
+    ),
+]
+Count = Annotated[int, Field(strict=True, ge=1)]
+Integrator = Literal["default", "rk4", "reference"]
+Tolerance = (
+    Annotated[Number, Field(gt=0.0, le=_TOLERANCE_MAX, description="of the default integrator, relative")]
+    | None
+)
+Series = Annotated[ArrayLike, PlainValidator(_as_series)]
+Path = Annotated[ArrayLike, PlainValidator(_as_path)]
+Stress = Annotated[ArrayLike, PlainValidator(_as_stress)]
+
+
+def checked(test: Callable[_P, _R]) -> Callable[_P, _R]:
+    """A test whose arguments are checked against its own annotations, and refused as those of a scene are.
+
+    Raises :class:`InvalidInput` with a path such as ``lab.cyclic_dss.csr``; an unknown keyword is told with
+    the nearest right one.
+    """
+    hints = typing.get_type_hints(test, include_extras=True)
+    parameters = inspect.signature(test).parameters.values()
+    fields: dict[str, Any] = {
+        parameter.name: (
+            hints[parameter.name],
+            ... if parameter.default is inspect.Parameter.empty else parameter.default,
+        )
+        for parameter in parameters
+    }
+    arguments = create_model(test.__name__, __base__=Model, **fields)
+    arguments._label = f"lab.{test.__name__}"
+    arguments._positional = tuple(
+        parameter.name for parameter in parameters if parameter.kind is not inspect.Parameter.KEYWORD_ONLY
+    )
+
+    @functools.wraps(test)
+    def checking(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        valid = arguments(*args, **kwargs)
+        return typing.cast(Callable[..., _R], test)(**{name: getattr(valid, name) for name in fields})
+
+    return checking

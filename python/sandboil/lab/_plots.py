@@ -1,0 +1,80 @@
+"""Pictures of the tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from .._errors import InvalidInput
+from .._style import OURS, REFERENCE, STYLE
+from ..discretise import Floats
+from ._results import CyclicTest, ShearTest
+
+# Each quantity: its label, and the factor from the record to the paper.
+_QUANTITIES = {
+    "gamma": ("shear strain, %", 100.0),
+    "tau": ("shear stress, kPa", 1.0),
+    "sigma_v_eff": ("vertical effective stress, kPa", 1.0),
+    "r_u": ("excess pore pressure ratio, 1", 1.0),
+    "eps_v": ("contraction, %", 100.0),
+    "cycle": ("cycles, 1", 1.0),
+}
+
+
+def cyclic(test: CyclicTest, reference: object | None) -> Figure:
+    """Stress path, stress-strain loops, and pore pressure (drained: contraction) and strain over cycles."""
+    panels = [
+        ("sigma_v_eff", "tau"),
+        ("gamma", "tau"),
+        ("cycle", "eps_v" if test.eps_v.any() else "r_u"),
+        ("cycle", "gamma"),
+    ]
+    return _drawn(test, reference, panels, (2, 2))
+
+
+def monotonic(test: ShearTest, reference: object | None) -> Figure:
+    """Stress-strain curve, stress path, and pore pressure (drained: contraction) over strain."""
+    panels = [
+        ("gamma", "tau"),
+        ("sigma_v_eff", "tau"),
+        ("gamma", "eps_v" if test.eps_v.any() else "r_u"),
+    ]
+    return _drawn(test, reference, panels, (1, 3))
+
+
+def _drawn(
+    test: ShearTest, reference: object | None, panels: list[tuple[str, str]], shape: tuple[int, int]
+) -> Figure:
+    rows, columns = shape
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(1.0 + 3.8 * columns, 0.6 + 2.9 * rows), layout="constrained")
+        for axes, names in zip(figure.subplots(rows, columns).flat, panels, strict=True):
+            if reference is not None:
+                _draw(axes, reference, names, {"color": REFERENCE, "label": "reference"})
+            _draw(axes, test, names, {"color": OURS, "lw": 0.8, "label": "sandboil"})
+            (x, y) = names
+            axes.set(xlabel=_QUANTITIES[x][0], ylabel=_QUANTITIES[y][0])
+            if x in ("sigma_v_eff", "cycle"):
+                axes.set_xlim(left=0.0)
+        if reference is not None:
+            figure.axes[0].legend(loc="best")
+    return figure
+
+
+def _draw(axes: Axes, source: object, names: tuple[str, str], look: dict[str, Any]) -> None:
+    x, y = (_QUANTITIES[name][1] * _values(source, name) for name in names)
+    axes.plot(x, y, **look)
+
+
+def _values(source: object, name: str) -> Floats:
+    """An array by its name from a test, or from anything that has it as an attribute or under a key."""
+    try:
+        value = source[name] if isinstance(source, Mapping) else getattr(source, name)
+    except (AttributeError, KeyError):
+        raise InvalidInput("reference", source, f"must have {name}, an array") from None
+    return np.asarray(value, dtype=np.float64)

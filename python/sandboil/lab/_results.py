@@ -1,0 +1,178 @@
+"""What the tests give back: plain arrays, with the few questions that one asks of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _core
+from .._errors import InvalidInput
+from ..discretise import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Record:
+    """Rows of a test, and how it ended.
+
+    Attributes
+    ----------
+    complete : False if the soil gave up before the end that was asked for
+    ended : why the test ended, in words
+    """
+
+    complete: bool
+    ended: str
+
+    def to_dataframe(self) -> Any:
+        """One row per record, one column per array, as a pandas DataFrame.
+
+        Raises :class:`ImportError` that says how to get pandas where it is missing.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            raise ImportError("to_dataframe needs pandas: pip install 'sandboil[studies]'") from error
+        return pandas.DataFrame(self.columns())
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every one-dimensional array by its name."""
+        values = {name: getattr(self, name) for name in self._names()}
+        return {name: value for name, value in values.items() if np.ndim(value) == 1}
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        return [each.name for each in fields(cls)]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ShearTest(Record):
+    """Direct simple shear. Each array has shape (n,).
+
+    Attributes
+    ----------
+    gamma : engineering shear strain since the start, 1
+    tau : shear stress, kPa
+    sigma_v_eff, sigma_h_eff : vertical and horizontal effective stress, kPa, compression positive
+    eps_v : volumetric strain since the start, 1, contraction positive
+    void_ratio : nan for models that have none
+    sigma_v0 : vertical effective stress at the start, kPa
+    specimen : the soil after the test, or None where it is not at hand
+    """
+
+    gamma: Floats
+    tau: Floats
+    sigma_v_eff: Floats
+    sigma_h_eff: Floats
+    eps_v: Floats
+    void_ratio: Floats
+    sigma_v0: float
+    specimen: _core.Specimen | None = field(default=None, repr=False)
+
+    @property
+    def r_u(self) -> Floats:
+        """Excess pore pressure ratio of a constant-volume test, 1 - sigma_v_eff/sigma_v0."""
+        return 1.0 - self.sigma_v_eff / self.sigma_v0
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        return [*super()._names(), "r_u"]
+
+    def plot(self, reference: object | None = None) -> Figure:
+        """Stress-strain curve, stress path, and pore pressure or volume over strain, as a matplotlib figure;
+        `reference` as for :meth:`CyclicTest.plot`, without `cycle`."""
+        from ._plots import monotonic
+
+        return monotonic(self, reference)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CyclicTest(ShearTest):
+    """Cyclic direct simple shear: a :class:`ShearTest` with turns.
+
+    Attributes
+    ----------
+    cycle : cycles so far, shape (n,): 0.25 at the first turn, half a cycle from turn to turn, in between in
+        proportion to the shear stress (to the shear strain where that is turned)
+    turns : turns made so far, that at this row included, shape (n,), integers
+    """
+
+    cycle: Floats
+    turns: NDArray[np.int64]
+
+    def cycles_to(
+        self, *, r_u: float | None = None, gamma_sa: float | None = None, gamma_da: float | None = None
+    ) -> float:
+        """Cycles until one measure first reaches a level, or nan if it never does.
+
+        Parameters
+        ----------
+        r_u : excess pore pressure ratio, 1
+        gamma_sa : single amplitude, the distance of the shear strain from its value at the start, 1
+        gamma_da : double amplitude, the distance of the shear strain from its value at the last turn, 1;
+            there is none before the first turn
+
+        Raises
+        ------
+        InvalidInput : not exactly one measure, or a level that is not positive
+        """
+        asked = {"r_u": r_u, "gamma_sa": gamma_sa, "gamma_da": gamma_da}
+        given = {name: level for name, level in asked.items() if level is not None}
+        if len(given) != 1:
+            raise InvalidInput("cycles_to", given, f"must be given exactly one measure of {', '.join(asked)}")
+        ((name, level),) = given.items()
+        if not level > 0.0:
+            raise InvalidInput(f"cycles_to.{name}", level, "must be greater than 0")
+        measure = {"r_u": self.r_u, "gamma_sa": self.gamma_sa, "gamma_da": self.gamma_da}[name]
+        reached = measure >= level
+        if not reached.any():
+            return float("nan")
+        row = int(np.argmax(reached))
+        if row == 0:
+            return 0.0
+        before, after = measure[row - 1 : row + 1]
+        return float(np.interp(level, (before, after), self.cycle[row - 1 : row + 1]))
+
+    @property
+    def gamma_sa(self) -> Floats:
+        """Single amplitude of the shear strain, |gamma - gamma at the start|, 1, shape (n,)."""
+        amplitude: Floats = np.abs(self.gamma - self.gamma[0])
+        return amplitude
+
+    @property
+    def gamma_da(self) -> Floats:
+        """Double amplitude of the shear strain, |gamma - gamma at the last turn|, 1, shape (n,): at a turn
+        the whole stroke from the turn before, 0 up to the first turn."""
+        at_turn = self._rows_of_turns()
+        passed = self.turns.copy()
+        passed[at_turn] -= 1
+        # Rows that no turn precedes take the last entry.
+        turned = np.append(self.gamma[at_turn], np.nan)[passed - 1]
+        amplitude: Floats = np.nan_to_num(np.abs(self.gamma - turned))
+        return amplitude
+
+    def _rows_of_turns(self) -> NDArray[np.intp]:
+        return np.flatnonzero(np.diff(self.turns, prepend=0))
+
+    def peaks(self) -> Self:
+        """The rows at the turns only."""
+        at_turn = self._rows_of_turns()
+        kept = {each.name: getattr(self, each.name) for each in fields(self)}
+        return type(self)(
+            **{name: value[at_turn] if np.ndim(value) == 1 else value for name, value in kept.items()}
+        )
+
+    def plot(self, reference: object | None = None) -> Figure:
+        """Stress path, stress-strain loops, and pore pressure and strain over cycles, as a matplotlib figure.
+
+        `reference` is drawn beside: another test, or anything with `gamma`, `tau`, `sigma_v_eff`, `r_u` and
+        `cycle` as attributes or as keys.
+        """
+        from ._plots import cyclic
+
+        return cyclic(self, reference)
