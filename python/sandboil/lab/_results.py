@@ -16,18 +16,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Record:
-    """Rows of a test, and how it ended.
+class Table:
+    """Columns of equal length."""
 
-    Attributes
-    ----------
-    complete : False if the soil gave up before the end that was asked for
-    ended : why the test ended, in words
-    """
-
-    complete: bool
-    ended: str
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every column by its name."""
+        raise NotImplementedError
 
     def to_dataframe(self) -> Any:
         """One row per record, one column per array, as a pandas DataFrame.
@@ -39,6 +33,20 @@ class Record:
         except ImportError as error:
             raise ImportError("to_dataframe needs pandas: pip install 'sandboil[studies]'") from error
         return pandas.DataFrame(self.columns())
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Record(Table):
+    """Rows of a test, and how it ended.
+
+    Attributes
+    ----------
+    complete : False if the soil gave up before the end that was asked for
+    ended : why the test ended, in words
+    """
+
+    complete: bool
+    ended: str
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Every one-dimensional array by its name."""

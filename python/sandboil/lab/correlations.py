@@ -1,0 +1,116 @@
+"""Published correlations between in-situ tests, density, stiffness and cyclic resistance of clean sand.
+
+All are for one atmosphere of vertical effective stress, magnitude 7.5 and level ground unless the name says
+otherwise; arguments are plain numbers, stresses kPa. Each names its author and year and raises
+:class:`InvalidInput`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .._errors import InvalidInput
+
+P_ATM = 101.3
+"""Atmospheric pressure, kPa."""
+
+# Largest blow count and cone resistance of the databases behind the triggering curves; beyond them sand does
+# not liquefy and the polynomials have no meaning.
+_N_MAX = 46.0
+_QC_MAX = 211.0
+# The sustained-shear relation was fitted up to these.
+_ALPHA_MAX = 0.35
+_STATE_INDEX_RANGE = (-0.6, 0.1)
+
+
+def _within(name: str, value: float, low: float, high: float, meaning: str) -> float:
+    if not low < value <= high:
+        raise InvalidInput(
+            f"correlations.{name}", value, f"must be above {low:g} and at most {high:g} ({meaning})"
+        )
+    return float(value)
+
+
+def relative_density_from_spt(N160cs: float) -> float:
+    """Relative density, fraction: sqrt((N1)60cs / 46) (Idriss and Boulanger 2008)."""
+    return math.sqrt(_within("N160cs", N160cs, 0.0, _N_MAX, "clean-sand corrected blow count") / 46.0)
+
+
+def spt_from_relative_density(Dr: float) -> float:
+    """(N1)60cs = 46 Dr^2 (Idriss and Boulanger 2008)."""
+    density = _within("Dr", Dr, 0.0, 1.0, "relative density, fraction")
+    return 46.0 * density * density
+
+
+def relative_density_from_cpt(qc1Ncs: float) -> float:
+    """Relative density, fraction: 0.465 (q_c1Ncs / 0.9)^0.264 - 1.063 (Boulanger and Ziotopoulou 2017)."""
+    value = _within("qc1Ncs", qc1Ncs, 0.0, math.inf, "normalised cone resistance, clean sand")
+    density = 0.465 * math.pow(value / 0.9, 0.264) - 1.063
+    if not 0.0 < density <= 1.0:
+        raise InvalidInput(
+            "correlations.qc1Ncs",
+            qc1Ncs,
+            "must give a relative density above 0 and at most 1, that is 21 to 254",
+        )
+    return density
+
+
+def shear_modulus_coefficient(N160cs: float) -> float:
+    """PM4Sand's G0 = 167 sqrt((N1)60cs + 2.5) (Boulanger and Ziotopoulou 2017)."""
+    return 167.0 * math.sqrt(_within("N160cs", N160cs, 0.0, _N_MAX, "clean-sand corrected blow count") + 2.5)
+
+
+def crr_from_spt(N160cs: float) -> float:
+    """Cyclic resistance ratio in 15 cycles from (N1)60cs (Idriss and Boulanger 2008)."""
+    n = _within("N160cs", N160cs, 0.0, _N_MAX, "clean-sand corrected blow count")
+    return math.exp(n / 14.1 + (n / 126.0) ** 2 - (n / 23.6) ** 3 + (n / 25.4) ** 4 - 2.8)
+
+
+def crr_from_cpt(qc1Ncs: float) -> float:
+    """Cyclic resistance ratio in 15 cycles from q_c1Ncs (Boulanger and Idriss 2014)."""
+    q = _within("qc1Ncs", qc1Ncs, 0.0, _QC_MAX, "normalised cone resistance, clean sand")
+    return math.exp(q / 113.0 + (q / 1000.0) ** 2 - (q / 140.0) ** 3 + (q / 137.0) ** 4 - 2.8)
+
+
+def k_sigma(sigma_v0: float, *, N160cs: float | None = None, qc1Ncs: float | None = None) -> float:
+    """Overburden factor on cyclic resistance at the vertical effective stress `sigma_v0`, kPa.
+
+    min(1.1, 1 - C ln(sigma_v0 / p_A)), C = 1/(18.9 - 2.55 sqrt((N1)60cs)) or 1/(37.3 - 8.27 q_c1Ncs^0.264),
+    at most 0.3 (Boulanger and Idriss 2004, 2014).
+    """
+    _within("sigma_v0", sigma_v0, 0.0, math.inf, "vertical effective stress, kPa")
+    if (N160cs is None) == (qc1Ncs is None):
+        raise InvalidInput("correlations.k_sigma", (N160cs, qc1Ncs), "needs exactly one of N160cs and qc1Ncs")
+    if N160cs is not None:
+        n = _within("N160cs", N160cs, 0.0, _N_MAX, "clean-sand corrected blow count")
+        slope = 18.9 - 2.55 * math.sqrt(n)
+    else:
+        assert qc1Ncs is not None
+        q = _within("qc1Ncs", qc1Ncs, 0.0, _QC_MAX, "normalised cone resistance, clean sand")
+        slope = 37.3 - 8.27 * q**0.264
+    c = min(0.3, 1.0 / slope) if slope > 0.0 else 0.3
+    return min(1.1, 1.0 - c * math.log(sigma_v0 / P_ATM))
+
+
+def k_alpha(static_shear_ratio: float, *, Dr: float, sigma_v0: float, K0: float = 0.5) -> float:
+    """Sustained-shear factor on cyclic resistance at a static shear ratio (Idriss and Boulanger 2003, 2008).
+
+    Through the relative state parameter index xi_R = 1/(10 - ln(100 p'/p_A)) - Dr with
+    p' = (1 + 2 K0) sigma_v0 / 3, which is kept in [-0.6, 0.1]; fitted for ratios up to 0.35.
+    """
+    alpha = abs(static_shear_ratio)
+    if alpha > _ALPHA_MAX:
+        raise InvalidInput(
+            "correlations.static_shear_ratio", static_shear_ratio, f"must be at most {_ALPHA_MAX}"
+        )
+    p = (
+        (1.0 + 2.0 * K0)
+        * _within("sigma_v0", sigma_v0, 0.0, math.inf, "vertical effective stress, kPa")
+        / 3.0
+    )
+    index = 1.0 / (10.0 - math.log(100.0 * p / P_ATM)) - Dr
+    index = min(max(index, _STATE_INDEX_RANGE[0]), _STATE_INDEX_RANGE[1])
+    a = 1267.0 + 636.0 * alpha**2 - 634.0 * math.exp(alpha) - 632.0 * math.exp(-alpha)
+    b = math.exp(-1.11 + 12.3 * alpha**2 + 1.31 * math.log(alpha + 0.0001))
+    c = 0.138 + 0.126 * alpha + 2.52 * alpha**3
+    return a + b * math.exp(-index / c)
