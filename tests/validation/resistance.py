@@ -91,6 +91,7 @@ def _draw(
     found: list[lab.ResistanceCurve], sigma: list[lab.FactorCurve], alpha: list[lab.FactorCurve]
 ) -> None:
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import LogLocator, NullFormatter
 
     colours = ("#0072B2", "#009E73", "#D55E00")
     figure, axes = plt.subplots(1, 3, figsize=(13.0, 4.0), layout="constrained")
@@ -101,7 +102,9 @@ def _draw(
         for axis, by in ((axes[1], by_sigma), (axes[2], by_alpha)):
             axis.plot(by.x, by.factor, "o-", color=colour, label=row.name)
             axis.plot(by.x, by.published, "--", color=colour, lw=0.9)
+    axes[0].xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes[0].xaxis.set_major_formatter("{x:g}")
+    axes[0].xaxis.set_minor_formatter(NullFormatter())
     axes[0].set(xlabel="uniform cycles", ylabel="cyclic stress ratio", ylim=(0.0, None))
     axes[0].set_title("resistance; stars: Table 1 at 15 cycles", loc="left", fontsize=9)
     axes[0].legend(frameon=False, fontsize=6.5)

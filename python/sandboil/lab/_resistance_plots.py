@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from .._style import INPUT, OURS, REFERENCE, STYLE
 
@@ -29,7 +30,9 @@ def resistance(curve: ResistanceCurve, target: tuple[float, float] | None = None
         if target is not None:
             axes.plot(*target, marker="*", ms=13.0, ls="", color=REFERENCE, label="target", zorder=5)
         axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set(xlabel="uniform cycles", ylabel="cyclic stress ratio", ylim=(0.0, None))
         axes.grid(which="minor", alpha=0.15)
         axes.legend(loc="best")
