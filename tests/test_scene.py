@@ -359,7 +359,7 @@ def test_only_what_the_scene_requires_is_active() -> None:
         "pore water",
         "water diffusion",
         "water acceleration",
-        "PM4Sand state",
+        "soil state",
         "base dashpots",
     }
     dry = dry_column(dry_unit_weight=18.0)
@@ -369,7 +369,7 @@ def test_only_what_the_scene_requires_is_active() -> None:
     assert active(at_rest) == always | {"pore water"}
     assert ("water diffusion", False, "no shaking stage") in at_rest.active_physics()
     undrained = column(regions=[Region("sand", box(x=(0, 1), y=(0, 10)), SAND, Gs=2.67)])
-    assert active(undrained) == always | {"pore water", "PM4Sand state", "base dashpots"}
+    assert active(undrained) == always | {"pore water", "soil state", "base dashpots"}
     damped = column(numerics=Numerics(local_damping=0.05, velocity_filter=0.0))
     assert "local damping" in active(damped)
     assert "velocity filter" not in active(damped)

@@ -8,7 +8,7 @@ from . import lab
 from ._core import __version__
 from ._errors import InvalidInput, RunInterrupted, SandboilError, SimulationDiverged
 from .discretise import Discretisation, discretise
-from .materials import Elastic, PM4Sand
+from .materials import DruckerPrager, Elastic, PM4Sand, TotalStress
 from .motion import Motion, ResponseSpectrum, response_spectrum
 from .plan import Plan
 from .results import History, Profile, Run, Summary, Surface, load
@@ -36,6 +36,7 @@ __all__ = [
     "Box",
     "CompliantBase",
     "Discretisation",
+    "DruckerPrager",
     "Elastic",
     "Gravity",
     "History",
@@ -60,6 +61,7 @@ __all__ = [
     "SimulationDiverged",
     "Summary",
     "Surface",
+    "TotalStress",
     "Water",
     "WaterTable",
     "__version__",

@@ -98,7 +98,7 @@ class Model(BaseModel):
             rest = cause.path if not location else path + cause.path.lstrip(_NAME_CHARACTERS)
             return InvalidInput(rest, cause.value, cause.allowed, cause.hint)
         field = cls.model_fields.get(location[0]) if location else None
-        remedy = _remedy(field)
+        remedy = field_remedy(field)
         if kind == "extra_forbidden":
             known = cls._keys()
             meant = _meant(location[0], missing) or _meant(location[0], known)
@@ -149,7 +149,8 @@ def _described(field: FieldInfo | None) -> str:
     return f" ({field.description})" if field is not None and field.description else ""
 
 
-def _remedy(field: FieldInfo | None) -> str | None:
+def field_remedy(field: FieldInfo | None) -> str | None:
+    """What to do about a value that a field refuses, where the field says it."""
     extra = field.json_schema_extra if field is not None else None
     return str(extra["remedy"]) if isinstance(extra, dict) and "remedy" in extra else None
 

@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 from pydantic.config import JsonDict
 
+from . import _core
 from ._errors import InvalidInput
-from ._model import Model, Number
+from ._model import Model, Number, field_remedy
 
 _FRACTION: JsonDict = {"remedy": "it is a fraction, not a percentage: 55 % is written 0.55"}
 _NU: JsonDict = {
     "remedy": "nu = 0.5 is incompressible; undrained response comes from the pore water: "
     "keep the drained nu and give the region no hydraulic_conductivity"
 }
+_DEGREES: JsonDict = {"remedy": "angles are in degrees: sand has 28 to 45"}
+_DILATION: JsonDict = {"remedy": "0 keeps volume, phi is associated flow, which dilates more than soil does"}
+_COHESION: JsonDict = {
+    "remedy": "for soil without friction c is the undrained strength; 0.1 to 1 kPa is an apparent cohesion"
+}
+_TENSION: JsonDict = {"remedy": "leave it out for the apex c/tan(phi), 0 for soil that bears no tension"}
+_SOFTENING: JsonDict = {"remedy": "a shear strain, not a percentage: 5 % is written 0.05"}
+_UNDRAINED: JsonDict = {"remedy": "for strength that grows with pressure take DruckerPrager or MohrCoulomb"}
+_RESIDUAL: JsonDict = {"remedy": "leave it out for strength that stays"}
+_STRENGTH_NAMES = {"cohesion": "c", "friction_angle": "phi", "dilation_angle": "psi"}
 # Largest void ratio of any soil that carries load; above it the entry is a slip of units.
 _VOID_RATIO_MAX = 10.0
 # Largest critical-state friction angle of any sand, degrees; above it the entry is a slip of units.
@@ -167,16 +178,12 @@ class PM4Sand(Model):
         return self.model_dump()
 
 
-class Elastic(Model):
-    """Linear isotropic elasticity by G and K, or by E and nu (drained). Moduli in kPa.
-
-    Raises :class:`InvalidInput` unless exactly one pair is given.
-    """
+class _Skeleton(Model):
+    """Elastic constants of a soil: G and K, or E and nu (drained)."""
 
     _label: ClassVar[str] = "material"
-    _positional: ClassVar[tuple[str, ...]] = ("G", "K")
 
-    kind: Literal["elastic"] = "elastic"
+    kind: str
     G: Positive | None = Field(default=None, description="shear modulus, kPa")
     K: Positive | None = Field(default=None, description="bulk modulus, kPa")
     E: Positive | None = Field(default=None, description="Young's modulus, kPa")
@@ -184,20 +191,8 @@ class Elastic(Model):
         default=None, description="Poisson's ratio", json_schema_extra=_NU
     )
 
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            G: float | None = None,
-            K: float | None = None,
-            *,
-            E: float | None = None,
-            nu: float | None = None,
-            kind: str = "elastic",
-        ) -> None: ...
-
     @model_validator(mode="after")
-    def _one_pair(self) -> Elastic:
+    def _one_pair(self) -> Self:
         given = {name for name in ("G", "K", "E", "nu") if getattr(self, name) is not None}
         if given not in ({"G", "K"}, {"E", "nu"}):
             raise InvalidInput(
@@ -224,8 +219,182 @@ class Elastic(Model):
         return self.K
 
     def core(self) -> dict[str, float | str | None]:
-        """Kind and moduli as the numerical core takes them."""
-        return {"kind": self.kind, "G": self.shear_modulus, "K": self.bulk_modulus}
+        """Kind, moduli and parameters as the numerical core takes them."""
+        return self.model_dump(exclude={"E", "nu"}) | {"G": self.shear_modulus, "K": self.bulk_modulus}
 
 
-Material = Annotated[PM4Sand | Elastic, Field(discriminator="kind")]
+class Elastic(_Skeleton):
+    """Linear isotropic elasticity by G and K, or by E and nu (drained). Moduli in kPa.
+
+    Raises :class:`InvalidInput` unless exactly one pair is given.
+    """
+
+    _positional: ClassVar[tuple[str, ...]] = ("G", "K")
+
+    kind: Literal["elastic"] = "elastic"
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            G: float | None = None,
+            K: float | None = None,
+            *,
+            E: float | None = None,
+            nu: float | None = None,
+            kind: str = "elastic",
+        ) -> None: ...
+
+
+class _Plastic(_Skeleton):
+    """A soil with strength. What parameters must be to each other the numerical core knows, and is asked."""
+
+    def _check_set(self) -> None:
+        """Refuse what is not a set at all; the core checks the values."""
+
+    @model_validator(mode="after")
+    def _accepted_by_the_core(self) -> Self:
+        self._check_set()
+        try:
+            _core.small_strain_moduli(self.core(), (-100.0, -100.0, 0.0, -100.0))
+        except InvalidInput as error:
+            remedy = field_remedy(type(self).model_fields[error.path])
+            raise InvalidInput(f"material.{error.path}", error.value, error.allowed, remedy) from None
+        return self
+
+
+def _require_softening_strain(residual: dict[str, float | None], softening_strain: float | None) -> None:
+    """A residual strength and the strain that leads to it are given together or not at all."""
+    given = [name for name, value in residual.items() if value is not None]
+    if given and softening_strain is None:
+        raise InvalidInput(
+            "material.softening_strain",
+            None,
+            f"is required with {given[0]} (plastic shear strain over which strength is lost)",
+            "take the shear band's width over the spacing times what a laboratory test shows",
+        )
+    if softening_strain is not None and not given:
+        raise InvalidInput(
+            "material.softening_strain",
+            softening_strain,
+            f"needs a residual strength: {', '.join(residual)}",
+            "leave it out for strength that stays",
+        )
+
+
+class DruckerPrager(_Plastic):
+    """Drucker-Prager plasticity, non-associated, with cohesion, a tension cut-off and softening.
+
+    Strength by c (kPa), phi and psi (degrees, 0 <= psi <= phi < 90), effective stress. Elasticity by G and K
+    or by E and nu. `tension_cutoff` is the largest mean stress in tension, kPa; without it the cone's apex
+    c/tan(phi). `matching` "usual" takes the constants of most of the literature, exact in plane strain for
+    psi = phi and up to some percent weak below; "general" gives Mohr-Coulomb's plane-strain strength for any
+    psi. With residual values strength falls in proportion to plastic shear strain, over `softening_strain`; a
+    residual value left out stays at its peak. Long names `cohesion`, `friction_angle` and `dilation_angle`
+    are accepted. Raises :class:`InvalidInput`, also for softening steeper than elastic unloading.
+
+    Equations and limits: docs/theory/other_models.md.
+    """
+
+    _positional: ClassVar[tuple[str, ...]] = ("c", "phi", "psi")
+    _aliases: ClassVar[dict[str, str]] = _STRENGTH_NAMES
+
+    kind: Literal["drucker_prager"] = "drucker_prager"
+    c: NonNegative = Field(description="cohesion, kPa", json_schema_extra=_COHESION)
+    phi: Number = Field(ge=0.0, lt=90.0, description="friction angle, degrees", json_schema_extra=_DEGREES)
+    psi: NonNegative = Field(default=0.0, description="dilation angle, degrees", json_schema_extra=_DILATION)
+    tension_cutoff: NonNegative | None = Field(
+        default=None, description="largest mean tension, kPa; default c/tan(phi)", json_schema_extra=_TENSION
+    )
+    matching: Literal["usual", "general"] = "usual"
+    c_residual: NonNegative | None = Field(default=None, description="cohesion after softening, kPa")
+    phi_residual: NonNegative | None = Field(
+        default=None, description="friction angle after softening, degrees"
+    )
+    psi_residual: NonNegative | None = Field(
+        default=None, description="dilation angle after softening, degrees", json_schema_extra=_DILATION
+    )
+    softening_strain: Positive | None = Field(
+        default=None,
+        description="plastic shear strain over which strength is lost",
+        json_schema_extra=_SOFTENING,
+    )
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            c: float = ...,
+            phi: float = ...,
+            psi: float = 0.0,
+            *,
+            G: float | None = None,
+            K: float | None = None,
+            E: float | None = None,
+            nu: float | None = None,
+            tension_cutoff: float | None = None,
+            matching: str = "usual",
+            c_residual: float | None = None,
+            phi_residual: float | None = None,
+            psi_residual: float | None = None,
+            softening_strain: float | None = None,
+            kind: str = "drucker_prager",
+            **long_names: float,
+        ) -> None: ...
+
+    def _check_set(self) -> None:
+        names = ("c_residual", "phi_residual", "psi_residual")
+        _require_softening_strain({name: getattr(self, name) for name in names}, self.softening_strain)
+
+
+class TotalStress(_Plastic):
+    """Undrained shear strength Su (kPa) of the soil itself, whatever its pressure, with softening to Sr.
+
+    `criterion` "tresca" bounds the radius of Mohr's circle in the plane and leaves the out-of-plane stress
+    elastic; "von_mises" bounds sqrt(J2). With `Sr` strength falls with plastic shear strain kappa:
+    `softening` is "exponential", Sr + (Su - Sr) exp(-kappa/softening_strain), or "linear",
+    at Sr from `softening_strain` on. Elasticity by G and K or by E and nu.
+
+    Say once what resists compression: either the region lies under water, K is the drained bulk modulus and
+    the pore water adds its K_f/n; or the section is dry, stress is total and K is the undrained K + K_f/n. Do
+    not do both. Long names `undrained_strength` and `residual_strength` are accepted. Raises
+    :class:`InvalidInput`, also for softening steeper than elastic unloading.
+    """
+
+    _positional: ClassVar[tuple[str, ...]] = ("Su", "Sr")
+    _aliases: ClassVar[dict[str, str]] = {"undrained_strength": "Su", "residual_strength": "Sr"}
+
+    kind: Literal["total_stress"] = "total_stress"
+    Su: Positive = Field(description="undrained shear strength, kPa", json_schema_extra=_UNDRAINED)
+    Sr: Positive | None = Field(
+        default=None, description="residual shear strength, kPa; default Su", json_schema_extra=_RESIDUAL
+    )
+    softening_strain: Positive | None = Field(
+        default=None, description="scale of the plastic shear strain", json_schema_extra=_SOFTENING
+    )
+    softening: Literal["exponential", "linear"] = "exponential"
+    criterion: Literal["tresca", "von_mises"] = "tresca"
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            Su: float = ...,
+            Sr: float | None = None,
+            *,
+            G: float | None = None,
+            K: float | None = None,
+            E: float | None = None,
+            nu: float | None = None,
+            softening_strain: float | None = None,
+            softening: str = "exponential",
+            criterion: str = "tresca",
+            kind: str = "total_stress",
+            **long_names: float,
+        ) -> None: ...
+
+    def _check_set(self) -> None:
+        _require_softening_strain({"Sr": self.Sr}, self.softening_strain)
+
+
+Material = Annotated[PM4Sand | Elastic | DruckerPrager | TotalStress, Field(discriminator="kind")]

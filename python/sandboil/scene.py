@@ -22,7 +22,7 @@ from shapely.geometry.base import BaseGeometry
 from . import _core
 from ._errors import InvalidInput, nearest_name
 from ._model import Many, Model, Number
-from .materials import Material, NonNegative, PM4Sand, Positive
+from .materials import Elastic, Material, NonNegative, PM4Sand, Positive
 
 if TYPE_CHECKING:
     from .motion import Motion
@@ -859,7 +859,8 @@ class Scene(Model):
         """What this scene computes and what it is spared: (name, active, reason)."""
         wet = self.water is not None
         permeable = [region.name for region in self.regions if region.hydraulic_conductivity]
-        sands = [region.name for region in self.regions if isinstance(region.material, PM4Sand)]
+        # Linear elasticity remembers nothing but the stress.
+        stateful = [region.name for region in self.regions if not isinstance(region.material, Elastic)]
         shaken = any(isinstance(stage, Shaking) for stage in self.stages)
         damping = self.numerics.local_damping
         dry, still = "the scene has no water", "no shaking stage"
@@ -881,9 +882,9 @@ class Scene(Model):
             active("water acceleration", chosen, *no_flow, (not self.uses_acceleration_term, chosen)),
             ("partial saturation", False, "the water table is nowhere below the ground" if wet else dry),
             active(
-                "PM4Sand state",
-                f"in {', '.join(sands)}",
-                (not sands, "no PM4Sand region"),
+                "soil state",
+                f"in {', '.join(stateful)}",
+                (not stateful, "every region is linearly elastic"),
                 (not shaken, still),
             ),
             active("base dashpots", "compliant base while shaking", (not shaken, still)),

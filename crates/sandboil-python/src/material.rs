@@ -3,9 +3,11 @@
 use crate::errors::CoreError;
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
 use sandboil_soil::{
-    Integrator, Soil, SoilError, Stress,
+    Integrator, Soil, SoilError, Strength, Stress,
+    drucker_prager::{self, DruckerPrager, Matching},
     elastic::Elastic,
     pm4sand::{Options, PM4Sand, Parameters},
+    total_stress::{self, Criterion, Decay, TotalStress},
 };
 use sandboil_solver::SolverError;
 
@@ -19,13 +21,22 @@ pub fn refused(error: &SoilError) -> PyErr {
     }
 }
 
+/// The value of a key, `None` where it is absent or said to be none.
+fn optional<'py, T: FromPyObjectOwned<'py>>(dict: &Bound<'py, PyDict>, key: &str) -> PyResult<Option<T>> {
+    match dict.get_item(key)? {
+        Some(value) if !value.is_none() => Ok(Some(value.extract().map_err(Into::into)?)),
+        _ => Ok(None),
+    }
+}
+
+fn required<'py, T: FromPyObjectOwned<'py>>(dict: &Bound<'py, PyDict>, key: &str) -> PyResult<T> {
+    optional(dict, key)?.ok_or_else(|| PyValueError::new_err(format!("material needs {key}")))
+}
+
 /// PM4Sand parameters; keys are those of `sandboil.PM4Sand`, `None` takes the default.
 pub fn pm4sand_parameters(dict: &Bound<'_, PyDict>) -> PyResult<Parameters> {
-    let optional = |key: &str| -> PyResult<Option<f64>> {
-        dict.get_item(key)?.map_or(Ok(None), |value| value.extract())
-    };
-    let required =
-        |key: &str| optional(key)?.ok_or_else(|| PyValueError::new_err(format!("PM4Sand needs {key}")));
+    let optional = |key: &str| optional(dict, key);
+    let required = |key: &str| required(dict, key);
     Ok(Parameters {
         dr: required("Dr")?,
         g0: required("G0")?,
@@ -59,18 +70,65 @@ pub fn pm4sand(dict: &Bound<'_, PyDict>, gap_memory: bool) -> PyResult<PM4Sand> 
     PM4Sand::new(pm4sand_parameters(dict)?, options).map_err(|error| refused(&error))
 }
 
+fn strength(dict: &Bound<'_, PyDict>) -> PyResult<Strength> {
+    Ok(Strength { c: required(dict, "c")?, phi: required(dict, "phi")?, psi: required(dict, "psi")? })
+}
+
+fn drucker_prager(dict: &Bound<'_, PyDict>, elastic: Elastic) -> PyResult<DruckerPrager> {
+    let peak = strength(dict)?;
+    let softening = match optional(dict, "softening_strain")? {
+        Some(strain) => {
+            let residual = Strength {
+                c: optional(dict, "c_residual")?.unwrap_or(peak.c),
+                phi: optional(dict, "phi_residual")?.unwrap_or(peak.phi),
+                psi: optional(dict, "psi_residual")?.unwrap_or(peak.psi),
+            };
+            Some(drucker_prager::Softening { residual, strain })
+        }
+        None => None,
+    };
+    let matching = match required::<String>(dict, "matching")?.as_str() {
+        "usual" => Matching::Usual,
+        "general" => Matching::General,
+        other => return Err(PyValueError::new_err(format!("unknown matching {other:?}"))),
+    };
+    let tension_cutoff = optional(dict, "tension_cutoff")?;
+    let parameters = drucker_prager::Parameters { peak, softening, tension_cutoff, matching };
+    DruckerPrager::new(elastic, parameters).map_err(|error| refused(&error))
+}
+
+fn total_stress(dict: &Bound<'_, PyDict>, elastic: Elastic) -> PyResult<TotalStress> {
+    let criterion = match required::<String>(dict, "criterion")?.as_str() {
+        "tresca" => Criterion::Tresca,
+        "von_mises" => Criterion::VonMises,
+        other => return Err(PyValueError::new_err(format!("unknown criterion {other:?}"))),
+    };
+    let decay = match required::<String>(dict, "softening")?.as_str() {
+        "exponential" => Decay::Exponential,
+        "linear" => Decay::Linear,
+        other => return Err(PyValueError::new_err(format!("unknown softening {other:?}"))),
+    };
+    let softening = match optional(dict, "Sr")? {
+        Some(residual) => {
+            let strain = required(dict, "softening_strain")?;
+            Some(total_stress::Softening { residual, strain, decay })
+        }
+        None => None,
+    };
+    TotalStress::new(elastic, criterion, required(dict, "Su")?, softening).map_err(|error| refused(&error))
+}
+
 /// A soil from its dictionary; `kind` says which.
 pub fn soil(dict: &Bound<'_, PyDict>, gap_memory: bool) -> PyResult<Soil> {
-    let value = |key: &str| -> PyResult<Bound<'_, PyAny>> {
-        dict.get_item(key)?.ok_or_else(|| PyValueError::new_err(format!("material needs {key}")))
+    let elastic = || -> PyResult<Elastic> {
+        Elastic::new(required(dict, "G")?, required(dict, "K")?).map_err(|error| refused(&error))
     };
-    let kind: String = value("kind")?.extract()?;
+    let kind: String = required(dict, "kind")?;
     match kind.as_str() {
-        "elastic" => {
-            let elastic = Elastic::new(value("G")?.extract()?, value("K")?.extract()?);
-            Ok(Soil::Elastic(elastic.map_err(|error| refused(&error))?))
-        }
+        "elastic" => Ok(Soil::Elastic(elastic()?)),
+        "drucker_prager" => Ok(Soil::DruckerPrager(drucker_prager(dict, elastic()?)?)),
         "pm4sand" => Ok(Soil::PM4Sand(Box::new(pm4sand(dict, gap_memory)?))),
+        "total_stress" => Ok(Soil::TotalStress(total_stress(dict, elastic()?)?)),
         other => Err(PyValueError::new_err(format!("unknown material kind {other:?}"))),
     }
 }

@@ -1,22 +1,14 @@
 //! Linear isotropic elasticity in plane strain, with the Jaumann rate of stress.
 
 use crate::{
-    Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport, bulk_to_shear,
-    error::finite, tensor::Deviator,
+    Deviator, Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport, bulk_to_shear,
+    error::{check, positive},
 };
 
 /// Linear isotropic elastic material.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Elastic {
     moduli: Moduli,
-}
-
-fn positive(name: &'static str, value: f64) -> Result<f64, SoilError> {
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(SoilError::InvalidParameter { name, value, expected: "positive and finite" })
-    }
 }
 
 impl Elastic {
@@ -27,10 +19,7 @@ impl Elastic {
 
     /// Material with shear modulus `shear`, kPa, and Poisson's ratio in (-1, 0.5).
     pub fn from_poisson(shear: f64, nu: f64) -> Result<Self, SoilError> {
-        finite("nu", nu)?;
-        if !(nu > -1.0 && nu < 0.5) {
-            return Err(SoilError::InvalidParameter { name: "nu", value: nu, expected: "in (-1, 0.5)" });
-        }
+        check("nu", nu, "in (-1, 0.5)", nu > -1.0 && nu < 0.5)?;
         Self::new(shear, bulk_to_shear(nu) * shear)
     }
 
@@ -47,17 +36,11 @@ impl Elastic {
     pub fn moved(&self, stress: &Stress, de: &StrainIncrement) -> Stress {
         let Moduli { bulk, shear } = self.moduli;
         let volume = de.xx + de.yy;
-        let mean = 0.5 * (stress.xx + stress.yy) + self.moduli.mean_stress_stiffness() * volume;
-        let deviator = Deviator { half_difference: 0.5 * (stress.xx - stress.yy), xy: stress.xy };
+        let mean = stress.plane_mean() + self.moduli.mean_stress_stiffness() * volume;
         let strain = Deviator { half_difference: 0.5 * (de.xx - de.yy), xy: 0.5 * de.xy };
         // A clockwise turn of the material by `spin` is a view from axes turned counter-clockwise by it.
-        let deviator = deviator.in_axes_turned(cayley(de.spin)) + strain * (2.0 * shear);
-        Stress {
-            xx: mean + deviator.half_difference,
-            yy: mean - deviator.half_difference,
-            xy: deviator.xy,
-            zz: stress.zz + (bulk - 2.0 / 3.0 * shear) * volume,
-        }
+        let deviator = stress.plane_deviator().in_axes_turned(cayley(de.spin)) + strain * (2.0 * shear);
+        Stress::of_plane(mean, deviator, stress.zz + (bulk - 2.0 / 3.0 * shear) * volume)
     }
 }
 

@@ -37,3 +37,22 @@ pub enum SoilError {
 pub(crate) fn finite(quantity: &'static str, value: f64) -> Result<f64, SoilError> {
     if value.is_finite() { Ok(value) } else { Err(SoilError::NonFinite { quantity, value }) }
 }
+
+/// Refuses a parameter that is not finite or fails its condition.
+pub(crate) fn check(
+    name: &'static str,
+    value: f64,
+    expected: &'static str,
+    ok: bool,
+) -> Result<f64, SoilError> {
+    if ok && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(SoilError::InvalidParameter { name, value, expected })
+    }
+}
+
+/// Refuses a parameter that is not positive.
+pub(crate) fn positive(name: &'static str, value: f64) -> Result<f64, SoilError> {
+    check(name, value, "positive and finite", value > 0.0)
+}

@@ -3,6 +3,7 @@
 //! This crate knows no particle, no time and no file. Units: kPa for stress, strains are plain numbers.
 //! At this border stress and strain are tension positive; stress is effective.
 
+pub mod drucker_prager;
 pub mod elastic;
 mod error;
 mod integrator;
@@ -10,12 +11,15 @@ pub mod laboratory;
 mod model;
 pub mod pm4sand;
 mod report;
+mod strength;
 mod tensor;
+pub mod total_stress;
 
 pub use error::SoilError;
 pub use integrator::Integrator;
 pub use model::{Soil, SoilModel};
 pub use report::UpdateReport;
+pub use strength::Strength;
 pub use tensor::{Deviator, StrainIncrement, Stress};
 
 /// Current elastic moduli of a material, kPa.

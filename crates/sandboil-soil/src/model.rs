@@ -1,10 +1,11 @@
 //! The one interface of all soil models, and the list of those there are.
 //!
 //! A new model is one file: its parameters, its state, and [`SoilModel`] for them (`docs/theory/writing_a_model.md`).
-//! It joins the others by one line in [`Soil`].
+//! It joins the others by one line in [`Soil`] and one in [`with_model!`](crate::with_model).
 
 use crate::{
-    Integrator, Moduli, SoilError, StrainIncrement, Stress, UpdateReport, elastic::Elastic, pm4sand::PM4Sand,
+    Integrator, Moduli, SoilError, StrainIncrement, Stress, UpdateReport, drucker_prager::DruckerPrager,
+    elastic::Elastic, pm4sand::PM4Sand, total_stress::TotalStress,
 };
 use std::fmt::Debug;
 
@@ -75,8 +76,12 @@ pub trait SoilModel: Clone + Debug + Send + Sync {
 pub enum Soil {
     /// Linear elasticity.
     Elastic(Elastic),
+    /// Drucker-Prager plasticity.
+    DruckerPrager(DruckerPrager),
     /// PM4Sand.
     PM4Sand(Box<PM4Sand>),
+    /// Undrained strength on total stress.
+    TotalStress(TotalStress),
 }
 
 /// Runs generic code on whichever model a [`Soil`] holds: `with_model!(soil, model => model.moduli(..))`.
@@ -85,7 +90,9 @@ macro_rules! with_model {
     ($soil:expr, $model:ident => $body:expr) => {
         match $soil {
             $crate::Soil::Elastic($model) => $body,
+            $crate::Soil::DruckerPrager($model) => $body,
             $crate::Soil::PM4Sand($model) => $body,
+            $crate::Soil::TotalStress($model) => $body,
         }
     };
 }

@@ -17,6 +17,52 @@ pub struct Stress {
 }
 
 impl Stress {
+    /// In-plane mean `(xx + yy)/2`, kPa.
+    #[inline]
+    pub fn plane_mean(&self) -> f64 {
+        0.5 * (self.xx + self.yy)
+    }
+
+    /// In-plane deviator, kPa.
+    #[inline]
+    pub fn plane_deviator(&self) -> Deviator {
+        Deviator { half_difference: 0.5 * (self.xx - self.yy), xy: self.xy }
+    }
+
+    /// Radius of Mohr's circle in the plane: the largest in-plane shear stress, kPa.
+    #[inline]
+    pub fn radius(&self) -> f64 {
+        f64::hypot(0.5 * (self.xx - self.yy), self.xy)
+    }
+
+    /// First invariant `I1 = xx + yy + zz`, kPa.
+    #[inline]
+    pub fn first_invariant(&self) -> f64 {
+        self.xx + self.yy + self.zz
+    }
+
+    /// Square root of the second deviatoric invariant J2, kPa: the shear stress, where there is nothing else.
+    #[inline]
+    pub fn root_j2(&self) -> f64 {
+        let [a, b, c] = [self.xx - self.yy, self.yy - self.zz, self.zz - self.xx];
+        ((a * a + b * b + c * c) / 6.0 + self.xy * self.xy).sqrt()
+    }
+
+    /// Stress of an in-plane mean and deviator and an out-of-plane stress, kPa.
+    #[inline]
+    pub(crate) fn of_plane(mean: f64, deviator: Deviator, zz: f64) -> Self {
+        let Deviator { half_difference, xy } = deviator;
+        Self { xx: mean + half_difference, yy: mean - half_difference, xy, zz }
+    }
+
+    /// The stress with another first invariant, kPa, and its three-dimensional deviator times a factor.
+    #[inline]
+    pub(crate) fn with(&self, first_invariant: f64, factor: f64) -> Self {
+        let (old, new) = (self.first_invariant() / 3.0, first_invariant / 3.0);
+        let moved = |component: f64| new + (component - old) * factor;
+        Self { xx: moved(self.xx), yy: moved(self.yy), xy: self.xy * factor, zz: moved(self.zz) }
+    }
+
     /// The stress itself, refused if a component is not a finite number.
     pub(crate) fn finite(self, quantity: &'static str) -> Result<Self, SoilError> {
         for component in [self.xx, self.yy, self.xy, self.zz] {
@@ -37,6 +83,22 @@ pub struct StrainIncrement {
     pub xy: f64,
     /// Rotation, `(dv_x/dy - dv_y/dx)/2` times the time increment: clockwise positive, radians.
     pub spin: f64,
+}
+
+/// Largest strain component accepted in one increment: 1000 %, beyond which no path means anything.
+const MAX_STRAIN_INCREMENT: f64 = 10.0;
+
+impl StrainIncrement {
+    /// Refuses an increment with a component that is not finite, or of more than 1000 %.
+    pub(crate) fn bounded(&self) -> Result<(), SoilError> {
+        let largest = self.xx.abs().max(self.yy.abs()).max(self.xy.abs());
+        // A maximum passes over NaN, a sum does not.
+        finite("strain increment", self.xx + self.yy + self.xy + self.spin)?;
+        if largest > MAX_STRAIN_INCREMENT {
+            return Err(SoilError::StrainIncrementTooLarge { value: largest, limit: MAX_STRAIN_INCREMENT });
+        }
+        Ok(())
+    }
 }
 
 /// Deviator of a symmetric plane tensor: `xx = -yy = half_difference`.

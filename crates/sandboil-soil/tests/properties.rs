@@ -3,7 +3,7 @@
 
 mod point;
 
-use point::{CALIBRATIONS, advance, anisotropic, consolidated, sand, sand_with, shear};
+use point::{CALIBRATIONS, advance, anisotropic, consolidated, rotated, sand, sand_with, shear};
 use proptest::prelude::*;
 use sandboil_soil::elastic::Elastic;
 use sandboil_soil::pm4sand::{Options, PM4Sand, Parameters, State};
@@ -217,14 +217,6 @@ proptest! {
         }
         prop_assert!(f64::abs(work) <= 1e-13 * exchanged.max(1e-6), "{work} of {exchanged} kPa");
     }
-}
-
-/// Components (xx, yy, xy) of a tensor turned counter-clockwise.
-fn rotated([xx, yy, xy]: [f64; 3], angle: f64) -> [f64; 3] {
-    let (sin, cos) = (2.0 * angle).sin_cos();
-    let (mean, difference) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-    let turned = difference * cos - xy * sin;
-    [mean + turned, mean - turned, xy * cos + difference * sin]
 }
 
 /// From an isotropic stress, where the moduli do not change along the loop but for the fourth power of a tiny ratio.

@@ -179,7 +179,7 @@ impl SoilField {
             for point in &mut points[rows] {
                 set_moduli(point, elastic.constants());
             }
-            Ok(Law::Elastic(elastic.clone()))
+            Ok(Law::Elastic(*elastic))
         })
     }
 

@@ -25,9 +25,6 @@ use crate::{
 };
 use state::Strain;
 
-/// Largest strain component accepted in one increment: 1000 %, beyond which no path means anything.
-const MAX_STRAIN_INCREMENT: f64 = 10.0;
-
 impl SoilModel for PM4Sand {
     type State = State;
 
@@ -45,12 +42,7 @@ impl SoilModel for PM4Sand {
         de: &StrainIncrement,
         integrator: &Integrator,
     ) -> Result<UpdateReport, SoilError> {
-        let largest = de.xx.abs().max(de.yy.abs()).max(de.xy.abs());
-        let sum = finite("strain increment", de.xx + de.yy + de.xy + de.spin)?;
-        if !(largest <= MAX_STRAIN_INCREMENT) {
-            let value = if largest.is_finite() { largest } else { sum };
-            return Err(SoilError::StrainIncrementTooLarge { value, limit: MAX_STRAIN_INCREMENT });
-        }
+        de.bounded()?;
         let mut next = *state;
         let mut strain = Strain {
             volume: -(de.xx + de.yy),

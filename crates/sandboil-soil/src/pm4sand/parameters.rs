@@ -1,6 +1,9 @@
 //! Parameters: what the user gives, what follows from it.
 
-use crate::SoilError;
+use crate::{
+    SoilError,
+    error::{check, positive},
+};
 
 /// Atmospheric pressure, kPa.
 const P_ATM: f64 = 101.3;
@@ -150,18 +153,6 @@ impl Constants {
 pub struct PM4Sand {
     pub(super) constants: Constants,
     pub(super) options: Options,
-}
-
-fn check(name: &'static str, value: f64, expected: &'static str, ok: bool) -> Result<f64, SoilError> {
-    if ok && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(SoilError::InvalidParameter { name, value, expected })
-    }
-}
-
-fn positive(name: &'static str, value: f64) -> Result<f64, SoilError> {
-    check(name, value, "positive and finite", value > 0.0)
 }
 
 fn non_negative(name: &'static str, value: f64) -> Result<f64, SoilError> {

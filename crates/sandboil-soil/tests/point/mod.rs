@@ -33,6 +33,14 @@ pub fn shear(xy: f64) -> StrainIncrement {
     StrainIncrement { xy, ..StrainIncrement::default() }
 }
 
+/// Components (xx, yy, xy) of a tensor turned counter-clockwise.
+pub fn rotated([xx, yy, xy]: [f64; 3], angle: f64) -> [f64; 3] {
+    let (sin, cos) = (2.0 * angle).sin_cos();
+    let (mean, difference) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+    let turned = difference * cos - xy * sin;
+    [mean + turned, mean - turned, xy * cos + difference * sin]
+}
+
 /// Updates a state that cannot fail.
 pub fn advance(
     sand: &PM4Sand,

@@ -1,0 +1,733 @@
+//! What every model beside PM4Sand must do for any state and strain, and the closed forms each must meet.
+
+#![allow(clippy::unwrap_used, reason = "a failure here is a failure of the test")]
+
+mod point;
+
+use point::rotated;
+use proptest::prelude::*;
+use sandboil_soil::drucker_prager::{DruckerPrager, Matching, Parameters, Softening};
+use sandboil_soil::elastic::Elastic;
+use sandboil_soil::total_stress::{self, Criterion, Decay, TotalStress};
+use sandboil_soil::{
+    Integrator, Moduli, Soil, SoilError, SoilModel, StrainIncrement, Strength, Stress, with_model,
+};
+
+/// Round-off allowed of the size of the numbers it comes from.
+const ROUND_OFF: f64 = 1e-12;
+
+const G: f64 = 9.1e4;
+const K: f64 = 2.7e5;
+
+fn skeleton() -> Elastic {
+    Elastic::new(G, K).unwrap()
+}
+
+fn strength(c: f64, phi: f64, psi: f64) -> Strength {
+    Strength { c, phi, psi }
+}
+
+fn cone(peak: Strength, matching: Matching) -> Parameters {
+    Parameters { peak, softening: None, tension_cutoff: None, matching }
+}
+
+fn drucker_prager(peak: Strength, matching: Matching) -> DruckerPrager {
+    DruckerPrager::new(skeleton(), cone(peak, matching)).unwrap()
+}
+
+fn softening_cone() -> DruckerPrager {
+    let softening = Softening { residual: strength(2.0, 20.0, 0.0), strain: 0.05 };
+    let parameters = Parameters {
+        softening: Some(softening),
+        tension_cutoff: Some(3.0),
+        ..cone(strength(14.4, 31.0, 10.0), Matching::General)
+    };
+    DruckerPrager::new(skeleton(), parameters).unwrap()
+}
+
+/// Slope and size of the usual cone, and of the general one, by their textbook formulas.
+fn cone_constants(Strength { c, phi, psi }: Strength, matching: Matching) -> (f64, f64) {
+    let (tan, sin) = (phi.to_radians().tan(), phi.to_radians().sin());
+    let slope = |angle: f64| {
+        let tan = angle.to_radians().tan();
+        tan / (9.0 + 12.0 * tan * tan).sqrt()
+    };
+    let b = slope(psi);
+    match matching {
+        Matching::Usual => (slope(phi), 3.0 * c / (9.0 + 12.0 * tan * tan).sqrt()),
+        Matching::General => {
+            let a = sin / (3.0 * (1.0 - 3.0 * b * b).sqrt() + 3.0 * b * sin);
+            (a, if phi == 0.0 { c } else { 3.0 * a * c / tan })
+        }
+    }
+}
+
+fn cone_excess(stress: &Stress, (a, k): (f64, f64)) -> f64 {
+    stress.root_j2() + a * stress.first_invariant() - k
+}
+
+/// How far a stress with a plastic shear strain lies outside a surface, kPa.
+type Excess = Box<dyn Fn(&Stress, f64) -> f64>;
+
+struct Case {
+    soil: Soil,
+    excess: Excess,
+}
+
+fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    for matching in [Matching::Usual, Matching::General] {
+        for peak in [
+            strength(14.4, 31.0, 0.0),
+            strength(0.0, 37.0, 5.0),
+            strength(5.0, 30.0, 30.0),
+            strength(20.0, 0.0, 0.0),
+            strength(1.0, 89.0, 0.0),
+        ] {
+            cases.push(Case {
+                soil: Soil::DruckerPrager(drucker_prager(peak, matching)),
+                excess: Box::new(move |stress, _| cone_excess(stress, cone_constants(peak, matching))),
+            });
+        }
+    }
+    cases.push(Case {
+        soil: Soil::DruckerPrager(softening_cone()),
+        excess: Box::new(|stress, plastic| {
+            let (a0, k0) = cone_constants(strength(14.4, 31.0, 10.0), Matching::General);
+            let (a1, k1) = cone_constants(strength(2.0, 20.0, 0.0), Matching::General);
+            let share = (plastic / 0.05).min(1.0);
+            let on_cone = cone_excess(stress, (a0 + share * (a1 - a0), k0 + share * (k1 - k0)));
+            on_cone.max(stress.first_invariant() - 9.0)
+        }),
+    });
+    for criterion in [Criterion::Tresca, Criterion::VonMises] {
+        for decay in [None, Some(Decay::Exponential), Some(Decay::Linear)] {
+            cases.push(Case {
+                soil: Soil::TotalStress(clay(criterion, decay)),
+                excess: Box::new(move |stress, plastic| {
+                    size_in(criterion, stress) - clay_strength(decay, plastic)
+                }),
+            });
+        }
+    }
+    cases
+}
+
+/// Undrained strength of 25 kPa that falls to 5 kPa, on the scale of 5 % plastic shear strain.
+fn clay(criterion: Criterion, decay: Option<Decay>) -> TotalStress {
+    let softening = decay.map(|decay| total_stress::Softening { residual: 5.0, strain: 0.05, decay });
+    TotalStress::new(skeleton(), criterion, 25.0, softening).unwrap()
+}
+
+fn clay_strength(decay: Option<Decay>, plastic: f64) -> f64 {
+    match decay {
+        None => 25.0,
+        Some(Decay::Exponential) => 5.0 + 20.0 * (-plastic / 0.05).exp(),
+        Some(Decay::Linear) => (25.0 - 20.0 * plastic / 0.05).max(5.0),
+    }
+}
+
+fn size_in(criterion: Criterion, stress: &Stress) -> f64 {
+    match criterion {
+        Criterion::Tresca => (0.25 * (stress.xx - stress.yy).powi(2) + stress.xy.powi(2)).sqrt(),
+        Criterion::VonMises => {
+            let mean = stress.first_invariant() / 3.0;
+            let squares = [stress.xx, stress.yy, stress.zz].map(|normal| 0.5 * (normal - mean).powi(2));
+            (squares.iter().sum::<f64>() + stress.xy.powi(2)).sqrt()
+        }
+    }
+}
+
+fn size_of(stress: &Stress) -> f64 {
+    stress.root_j2() + stress.first_invariant().abs()
+}
+
+fn is_finite(stress: &Stress) -> bool {
+    [stress.xx, stress.yy, stress.xy, stress.zz].into_iter().all(f64::is_finite)
+}
+
+fn advance<M: SoilModel>(model: &M, state: &mut M::State, de: &StrainIncrement) {
+    model.update(state, de, &Integrator::default()).unwrap();
+}
+
+fn strain_of(xx: f64, yy: f64, xy: f64) -> StrainIncrement {
+    StrainIncrement { xx, yy, xy, spin: 0.0 }
+}
+
+fn isotropic(pressure: f64) -> Stress {
+    Stress { xx: -pressure, yy: -pressure, xy: 0.0, zz: -pressure }
+}
+
+fn difference(a: &Stress, b: &Stress) -> f64 {
+    [a.xx - b.xx, a.yy - b.yy, a.xy - b.xy, a.zz - b.zz].into_iter().fold(0.0, |most, d| most.max(d.abs()))
+}
+
+/// Density of the work done from one stress to another, kJ/m3.
+fn work(from: &Stress, to: &Stress, de: &StrainIncrement) -> f64 {
+    0.5 * ((from.xx + to.xx) * de.xx + (from.yy + to.yy) * de.yy + (from.xy + to.xy) * de.xy)
+}
+
+fn increment(exponents: std::ops::Range<f64>) -> impl Strategy<Value = StrainIncrement> {
+    (exponents, -1.0..1.0, -1.0..1.0, -1.0..1.0).prop_map(|(exponent, xx, yy, xy): (f64, f64, f64, f64)| {
+        let size = 10.0_f64.powf(exponent);
+        strain_of(size * xx, size * yy, size * xy)
+    })
+}
+
+fn any_stress() -> impl Strategy<Value = Stress> {
+    (-2.0..4.0, -1.0..1.0, -1.0..1.0, -1.0..1.0, -1.0..1.0).prop_map(
+        |(exponent, xx, yy, xy, zz): (f64, f64, f64, f64, f64)| {
+            let size = 10.0_f64.powf(exponent);
+            Stress { xx: size * xx, yy: size * yy, xy: size * xy, zz: size * zz }
+        },
+    )
+}
+
+/// Fails unless every state of the path is finite and inside the surface.
+fn stays_inside<M: SoilModel>(
+    model: &M,
+    excess: &dyn Fn(&Stress, f64) -> f64,
+    start: Stress,
+    path: &[StrainIncrement],
+) -> Result<(), TestCaseError> {
+    let mut state = model.initialise(start, None).unwrap();
+    let mut largest = size_of(&start);
+    let mut path = path.iter();
+    let mut before = 0.0;
+    loop {
+        let stress = model.stress(&state);
+        let plastic = model.plastic_shear_strain(&state).unwrap_or(0.0);
+        let f = excess(&stress, plastic);
+        prop_assert!(f <= ROUND_OFF * (largest + 1.0), "{model:?}: f = {f} kPa at {stress:?}");
+        prop_assert!(plastic >= before, "{model:?}: plastic shear strain falls from {before} to {plastic}");
+        before = plastic;
+        let Some(de) = path.next() else { return Ok(()) };
+        largest = size_of(&stress) + K * (de.xx.abs() + de.yy.abs() + de.xy.abs());
+        advance(model, &mut state, de);
+    }
+}
+
+/// Fails unless a spin on top of the strain turns the stress and changes nothing else. Strain comes in the axes of
+/// the end of a step.
+fn is_indifferent<M: SoilModel>(
+    model: &M,
+    start: Stress,
+    path: &[(StrainIncrement, f64)],
+) -> Result<(), TestCaseError> {
+    let mut still = model.initialise(start, None).unwrap();
+    let mut turning = still;
+    let mut clockwise = 0.0;
+    let mut largest = 1.0_f64;
+    for (de, spin) in path {
+        clockwise += 2.0 * (0.5 * spin).atan();
+        advance(model, &mut still, de);
+        let [xx, yy, xy] = rotated([de.xx, de.yy, 0.5 * de.xy], -clockwise);
+        advance(model, &mut turning, &StrainIncrement { xx, yy, xy: 2.0 * xy, spin: *spin });
+        let (a, b) = (model.stress(&still), model.stress(&turning));
+        let [xx, yy, xy] = rotated([a.xx, a.yy, a.xy], -clockwise);
+        largest = largest.max(size_of(&a)).max(K * (de.xx.abs() + de.yy.abs() + de.xy.abs()));
+        let off = difference(&b, &Stress { xx, yy, xy, zz: a.zz });
+        prop_assert!(off <= 1e-9 * largest, "{model:?}: {off} kPa of {largest}");
+    }
+    Ok(())
+}
+
+/// Fails unless numbers that mean nothing are refused and the state stays.
+fn refuses<M: SoilModel>(model: &M) {
+    let mut state = model.initialise(isotropic(50.0), None).unwrap();
+    advance(model, &mut state, &strain_of(1e-4, -2e-4, 3e-4));
+    let before = format!("{state:?}");
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for component in 0..4 {
+            let mut de = StrainIncrement { spin: 1e-3, ..strain_of(1e-5, 1e-5, 1e-5) };
+            *[&mut de.xx, &mut de.yy, &mut de.xy, &mut de.spin][component] = bad;
+            let refusal = model.update(&mut state, &de, &Integrator::default());
+            assert!(matches!(refusal, Err(SoilError::NonFinite { .. })), "{model:?}: {refusal:?}");
+            let mut stress = isotropic(50.0);
+            *[&mut stress.xx, &mut stress.yy, &mut stress.xy, &mut stress.zz][component] = bad;
+            assert!(matches!(model.initialise(stress, None), Err(SoilError::NonFinite { .. })), "{model:?}");
+        }
+    }
+    for de in [strain_of(10.01, 0.0, 0.0), strain_of(0.0, -10.01, 0.0), strain_of(0.0, 0.0, 1e300)] {
+        let refusal = model.update(&mut state, &de, &Integrator::default());
+        assert!(matches!(refusal, Err(SoilError::StrainIncrementTooLarge { .. })), "{model:?}: {refusal:?}");
+    }
+    // No finite number gives a stress that is not.
+    let de = strain_of(1e-5, 1e-5, 1e-5);
+    for size in [1e150, 1e300, f64::MAX] {
+        for sign in [1.0, -1.0] {
+            let stress = Stress { xx: sign * size, yy: -sign * size, xy: size, zz: size };
+            if let Ok(state) = model.initialise(stress, None) {
+                assert!(is_finite(&model.stress(&state)), "{model:?}");
+            }
+        }
+        let mut spun = state;
+        match model.update(&mut spun, &StrainIncrement { spin: size, ..de }, &Integrator::default()) {
+            Ok(_) => assert!(is_finite(&model.stress(&spun)), "{model:?}"),
+            Err(_) => assert_eq!(format!("{spun:?}"), before),
+        }
+    }
+    assert_eq!(format!("{state:?}"), before);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(256) })]
+
+    #[test]
+    fn no_path_leaves_the_surface(
+        start in any_stress(),
+        path in prop::collection::vec(increment(-9.0..1.0), 60),
+    ) {
+        for Case { soil, excess } in cases() {
+            with_model!(&soil, model => stays_inside(model, &excess, start, &path)?);
+        }
+    }
+
+    #[test]
+    fn spin_turns_the_stress_and_nothing_else(
+        start in any_stress(),
+        path in prop::collection::vec((increment(-6.0..-2.0), -0.5..0.5), 40),
+    ) {
+        for Case { soil, .. } in cases() {
+            with_model!(&soil, model => is_indifferent(model, start, &path)?);
+        }
+    }
+}
+
+#[test]
+fn numbers_that_mean_nothing_are_refused() {
+    for Case { soil, .. } in cases() {
+        with_model!(&soil, model => refuses(model));
+    }
+}
+
+#[test]
+fn steps_from_1e_9_to_10_reversed_every_time_stay_inside() {
+    for Case { soil, excess } in cases() {
+        for start in [Stress::default(), isotropic(100.0)] {
+            for exponent in -9..=1 {
+                let size = 10.0_f64.powi(exponent);
+                let path: Vec<_> = [1.0, -1.0]
+                    .into_iter()
+                    .cycle()
+                    .take(40)
+                    .map(|sign| strain_of(0.3 * sign * size, -0.2 * sign * size, sign * size))
+                    .collect();
+                with_model!(&soil, model => stays_inside(model, &excess, start, &path).unwrap());
+            }
+        }
+    }
+}
+
+#[test]
+fn inside_the_surface_the_answer_is_that_of_elasticity() {
+    for Case { soil, .. } in cases() {
+        with_model!(&soil, model => {
+            let mut state = model.initialise(isotropic(100.0), None).unwrap();
+            let start = model.stress(&state);
+            let mut expected = start;
+            let small = 1e-6;
+            let turns = [(1.0, -1.0, 1.0), (-2.0, 1.0, -1.0), (1.0, 0.0, 0.0)];
+            for (xx, yy, xy) in turns {
+                let de = strain_of(small * xx, small * yy, small * xy);
+                advance(model, &mut state, &de);
+                expected = Elastic::new(model.moduli(&state).shear, model.moduli(&state).bulk)
+                    .unwrap()
+                    .moved(&expected, &de);
+                assert_eq!(model.stress(&state), expected, "{model:?}");
+            }
+            assert!(difference(&model.stress(&state), &start) <= ROUND_OFF * size_of(&start));
+            assert_eq!(model.plastic_shear_strain(&state).unwrap_or(0.0), 0.0);
+        });
+    }
+}
+
+/// Along a straight strain path from an isotropic stress the flow keeps its direction: the return is exact.
+#[test]
+fn perfect_plasticity_does_not_see_the_step_on_a_straight_path() {
+    let direction = strain_of(1e-3, -3e-3, 2e-3);
+    for Case { soil, .. } in cases() {
+        let ends = [1, 7, 64].map(|parts| {
+            with_model!(&soil, model => {
+                let mut state = model.initialise(isotropic(100.0), None).unwrap();
+                let part = 1.0 / f64::from(parts);
+                for _ in 0..parts {
+                    let de = strain_of(part * direction.xx, part * direction.yy, part * direction.xy);
+                    advance(model, &mut state, &de);
+                }
+                (model.stress(&state), model.plastic_shear_strain(&state).unwrap_or(0.0))
+            })
+        });
+        // Softening with dilatancy takes the flow at the beginning of a step; all else is exact.
+        let dilates_less = matches!(&soil, Soil::DruckerPrager(model) if *model == softening_cone());
+        let allowed = if dilates_less { 0.02 } else { 1e-11 };
+        for (stress, plastic) in &ends[1..] {
+            assert!(difference(stress, &ends[0].0) <= allowed * size_of(&ends[0].0), "{soil:?}: {ends:?}");
+            assert!((plastic - ends[0].1).abs() <= allowed * ends[0].1.max(1e-3), "{soil:?}: {ends:?}");
+        }
+    }
+}
+
+/// Shear with the in-plane mean stress held, the volume free: the radius of Mohr's circle at the end.
+fn radius_at_failure<M: SoilModel>(model: &M, mean: f64) -> f64 {
+    let mut state = model.initialise(isotropic(-mean), None).unwrap();
+    for _ in 0..4000 {
+        let mut volume = 0.0;
+        let mut next = state;
+        for _ in 0..100 {
+            next = state;
+            advance(model, &mut next, &strain_of(0.5 * volume, 0.5 * volume, 1e-5));
+            let off = mean - model.stress(&next).plane_mean();
+            if off.abs() < 1e-12 * mean.abs() {
+                break;
+            }
+            volume += off / (K + G / 3.0);
+        }
+        state = next;
+    }
+    model.stress(&state).radius()
+}
+
+fn mohr_coulomb_radius(Strength { c, phi, .. }: Strength, mean: f64) -> f64 {
+    c * phi.to_radians().cos() - phi.to_radians().sin() * mean
+}
+
+#[test]
+fn strength_at_failure_in_plane_strain() {
+    for (peak, matching, radius) in [
+        (strength(5.0, 30.0, 30.0), Matching::Usual, 29.3301),
+        (strength(5.0, 30.0, 10.0), Matching::Usual, 28.837),
+        (strength(5.0, 30.0, 0.0), Matching::Usual, 28.180),
+        (strength(0.0, 37.0, 5.0), Matching::Usual, 28.864),
+        (strength(5.0, 30.0, 30.0), Matching::General, 29.3301),
+        (strength(5.0, 30.0, 10.0), Matching::General, 29.3301),
+        (strength(5.0, 30.0, 0.0), Matching::General, 29.3301),
+        (strength(0.0, 37.0, 5.0), Matching::General, 30.091),
+    ] {
+        let measured = radius_at_failure(&drucker_prager(peak, matching), -50.0);
+        assert!((measured - radius).abs() < 6e-4, "{peak:?} {matching:?}: {measured} {radius}");
+        if matching == Matching::General {
+            assert!((measured / mohr_coulomb_radius(peak, -50.0) - 1.0).abs() < 1e-9, "{measured}");
+        }
+    }
+}
+
+/// Compression along y with the lateral stress held, to the end.
+fn compressed<M: SoilModel>(model: &M, lateral: f64) -> Stress {
+    let mut state = model.initialise(isotropic(-lateral), None).unwrap();
+    for _ in 0..4000 {
+        let mut xx = 0.0;
+        let mut next = state;
+        for _ in 0..400 {
+            next = state;
+            advance(model, &mut next, &strain_of(xx, -1e-5, 0.0));
+            let off = lateral - model.stress(&next).xx;
+            if off.abs() < 1e-12 * lateral.abs() {
+                break;
+            }
+            xx += off / (K + 4.0 / 3.0 * G);
+        }
+        state = next;
+    }
+    model.stress(&state)
+}
+
+/// `sigma_1 = N sigma_3 + 2 c sqrt(N)`, `N = tan^2(45 + phi/2)`.
+fn passive_strength(Strength { c, phi, .. }: Strength, lateral: f64) -> f64 {
+    let n = (45.0 + 0.5 * phi).to_radians().tan().powi(2);
+    n * lateral - 2.0 * c * n.sqrt()
+}
+
+#[test]
+fn strength_in_plane_strain_compression() {
+    for peak in [strength(5.0, 30.0, 10.0), strength(14.4, 31.0, 0.0), strength(0.0, 37.0, 37.0)] {
+        let stress = compressed(&drucker_prager(peak, Matching::General), -50.0);
+        let expected = passive_strength(peak, -50.0);
+        assert!((stress.yy / expected - 1.0).abs() < 1e-8, "{peak:?}: {} {expected}", stress.yy);
+    }
+}
+
+/// Without dilatancy `I1 = 3 K e_v` to the end, and the shear stress is elastic up to the cone and then the cone's.
+#[test]
+fn oedometric_compression() {
+    let bulk = 0.8 * G;
+    let peak = strength(14.4, 31.0, 0.0);
+    let skeleton = Elastic::new(G, bulk).unwrap();
+    let soil = DruckerPrager::new(skeleton, cone(peak, Matching::Usual)).unwrap();
+    let (a, k) = cone_constants(peak, Matching::Usual);
+    let mut state = soil.initialise(Stress::default(), None).unwrap();
+    for step in 1..=200 {
+        advance(&soil, &mut state, &strain_of(0.0, -5e-5, 0.0));
+        let strain = -5e-5 * f64::from(step);
+        let (first_invariant, elastic) = (3.0 * bulk * strain, -2.0 / 3.0_f64.sqrt() * G * strain);
+        let expected = elastic.min(k - a * first_invariant);
+        let stress = soil.stress(&state);
+        assert!((stress.first_invariant() - first_invariant).abs() <= 1e-10 * first_invariant.abs());
+        assert!((stress.root_j2() - expected).abs() <= 1e-10 * expected, "{step}");
+        assert!((stress.xx - stress.zz).abs() <= 1e-10 * stress.xx.abs());
+        assert_eq!(expected < elastic, step > 3, "the soil yields in the fourth step");
+    }
+}
+
+#[test]
+fn without_dilatancy_plastic_flow_keeps_volume() {
+    let soil = drucker_prager(strength(14.4, 31.0, 0.0), Matching::Usual);
+    let mut state = soil.initialise(isotropic(100.0), None).unwrap();
+    for _ in 0..100 {
+        advance(&soil, &mut state, &strain_of(0.0, 0.0, 1e-3));
+    }
+    let stress = soil.stress(&state);
+    assert!(soil.plastic_shear_strain(&state).unwrap() > 0.09);
+    assert!((stress.first_invariant() + 300.0).abs() < 1e-9, "{stress:?}");
+}
+
+/// Dilatancy angle in plane strain: `sin(psi) = -d(e_v)/d(gamma)` of plastic strain.
+#[test]
+fn the_flow_dilates_by_its_angle() {
+    let psi = 10.0;
+    for matching in [Matching::Usual, Matching::General] {
+        let soil = drucker_prager(strength(5.0, 30.0, psi), matching);
+        let mut state = soil.initialise(isotropic(50.0), None).unwrap();
+        let (mut total, mut last) = (0.0, 0.0);
+        for _ in 0..2000 {
+            let mut volume = 0.0;
+            let mut next = state;
+            for _ in 0..100 {
+                next = state;
+                advance(&soil, &mut next, &strain_of(0.5 * volume, 0.5 * volume, 1e-5));
+                volume += (-50.0 - soil.stress(&next).plane_mean()) / (K + G / 3.0);
+            }
+            state = next;
+            total += volume;
+            last = volume;
+        }
+        assert!(total > 0.0 && (last / 1e-5 - psi.to_radians().sin()).abs() < 1e-6, "{}", last / 1e-5);
+    }
+}
+
+#[test]
+fn hydrostatic_tension_ends_at_the_apex() {
+    let peak = strength(14.4, 31.0, 0.0);
+    let apex = 14.4 / 31.0_f64.to_radians().tan();
+    for (tension_cutoff, tension) in [(None, apex), (Some(10.0), 10.0), (Some(0.0), 0.0)] {
+        let parameters = Parameters { tension_cutoff, ..cone(peak, Matching::Usual) };
+        let soil = DruckerPrager::new(skeleton(), parameters).unwrap();
+        let mut state = soil.initialise(isotropic(20.0), None).unwrap();
+        advance(&soil, &mut state, &strain_of(0.01, 0.01, 0.0));
+        let stress = soil.stress(&state);
+        assert!((stress.first_invariant() / 3.0 - tension).abs() <= 1e-11 * apex, "{stress:?}");
+        let corner = {
+            let (a, k) = cone_constants(peak, Matching::Usual);
+            k - 3.0 * a * tension
+        };
+        assert!((stress.root_j2() - corner).abs() <= 1e-9, "{stress:?} {corner}");
+        let again = soil.initialise(isotropic(-1000.0), None).unwrap();
+        assert!((soil.stress(&again).first_invariant() / 3.0 - tension).abs() <= 1e-11 * apex);
+        assert_eq!(soil.stress(&again).root_j2(), 0.0);
+    }
+}
+
+/// `int k d(gamma) = (k_p + k_r)/2 kappa_s` while the strength falls, `k_r` after.
+#[test]
+fn softening_ends_at_the_residual_and_costs_the_area_under_it() {
+    let softening = Softening { residual: strength(8.0, 0.0, 0.0), strain: 0.02 };
+    let parameters =
+        Parameters { softening: Some(softening), ..cone(strength(20.0, 0.0, 0.0), Matching::Usual) };
+    let soil = DruckerPrager::new(skeleton(), parameters).unwrap();
+    let mut state = soil.initialise(isotropic(30.0), None).unwrap();
+    let mut spent = 0.0;
+    for _ in 0..10_000 {
+        let before = soil.stress(&state);
+        let de = strain_of(0.0, 0.0, 5e-6);
+        advance(&soil, &mut state, &de);
+        spent += work(&before, &soil.stress(&state), &de);
+    }
+    let stress = soil.stress(&state);
+    assert!((stress.xy - 8.0).abs() < 1e-10);
+    let plastic = soil.plastic_shear_strain(&state).unwrap();
+    assert!((plastic - (0.05 - 8.0 / G)).abs() < 1e-12);
+    let stored = 0.5 * 8.0 * 8.0 / G;
+    let expected = 14.0 * 0.02 + 8.0 * (plastic - 0.02) + stored;
+    assert!((spent / expected - 1.0).abs() < 1e-6, "{spent} {expected}");
+}
+
+/// One step through the softening or many: the same end, for the strength at the end of each step is implicit.
+#[test]
+fn softening_converges_with_the_step() {
+    let soil = softening_cone();
+    let end = |parts: u32| {
+        let mut state = soil.initialise(isotropic(100.0), None).unwrap();
+        for _ in 0..parts {
+            advance(&soil, &mut state, &strain_of(0.0, 0.0, 0.03 / f64::from(parts)));
+        }
+        soil.stress(&state)
+    };
+    let exact = end(6400);
+    let errors = [25, 50, 100, 200].map(|parts| difference(&end(parts), &exact));
+    for pair in errors.windows(2) {
+        assert!(pair[1] < 0.6 * pair[0], "{errors:?}");
+    }
+    assert!(errors[3] < 1e-2 * size_of(&exact), "{errors:?}");
+}
+
+/// At a pressure where friction falls faster than `G` unloads, the point drops to its residual strength at once.
+#[test]
+fn brittle_softening_drops_to_the_residual() {
+    let softening = Softening { residual: strength(1.0, 10.0, 0.0), strain: 1e-3 };
+    let parameters =
+        Parameters { softening: Some(softening), ..cone(strength(1.0, 40.0, 0.0), Matching::General) };
+    let soil = DruckerPrager::new(skeleton(), parameters).unwrap();
+    let pressure = 2000.0;
+    let mut state = soil.initialise(isotropic(pressure), None).unwrap();
+    let mut radii = Vec::new();
+    for _ in 0..4000 {
+        advance(&soil, &mut state, &strain_of(0.0, 0.0, 1e-5));
+        radii.push(soil.stress(&state).radius());
+    }
+    let (a, k) = cone_constants(strength(1.0, 10.0, 0.0), Matching::General);
+    assert!((radii[3999] - (k + 3.0 * a * pressure)).abs() < 1e-6);
+    let drops = radii.windows(2).filter(|pair| pair[1] < pair[0] - 1.0).count();
+    assert_eq!(drops, 1);
+}
+
+/// With associated flow and convex elasticity plastic work is never negative.
+#[test]
+fn associated_flow_dissipates() {
+    let soil = drucker_prager(strength(5.0, 30.0, 30.0), Matching::Usual);
+    let inverse = |s: &Stress| {
+        let mean = s.first_invariant() / 3.0;
+        let strain = |component: f64| (component - mean) / (2.0 * G) + mean / (3.0 * K);
+        [strain(s.xx), strain(s.yy), s.xy / G, strain(s.zz)]
+    };
+    let mut state = soil.initialise(isotropic(20.0), None).unwrap();
+    let mut angle = 0.0_f64;
+    for step in 0..2000 {
+        angle += 0.7;
+        let de =
+            strain_of(1e-4 * angle.cos(), -1e-4 * (1.3 * angle).cos(), 3e-4 * (0.11 * f64::from(step)).sin());
+        let before = soil.stress(&state);
+        advance(&soil, &mut state, &de);
+        let after = soil.stress(&state);
+        let (e0, e1) = (inverse(&before), inverse(&after));
+        let plastic = [de.xx, de.yy, de.xy, 0.0];
+        let stress = [after.xx, after.yy, after.xy, after.zz];
+        let spent: f64 = (0..4).map(|i| stress[i] * (plastic[i] - (e1[i] - e0[i]))).sum();
+        assert!(spent >= -1e-12, "{spent} kPa in step {step}");
+    }
+}
+
+#[test]
+fn undrained_strength_is_the_radius_at_failure() {
+    let tresca = clay(Criterion::Tresca, None);
+    let von_mises = clay(Criterion::VonMises, None);
+    // An out-of-plane stress far from the mean: it must flow there before von Mises gives all its strength.
+    let start = Stress { zz: -80.0, ..isotropic(100.0) };
+    let (mut a, mut b) =
+        (tresca.initialise(start, None).unwrap(), von_mises.initialise(start, None).unwrap());
+    let mut least = f64::INFINITY;
+    for step in 0..400 {
+        let de = strain_of(2e-5, -2e-5, 3e-5);
+        advance(&tresca, &mut a, &de);
+        advance(&von_mises, &mut b, &de);
+        if step > 6 {
+            assert!((tresca.stress(&a).radius() - 25.0).abs() < 1e-12);
+            assert!(von_mises.stress(&b).radius() <= 25.0 * (1.0 + ROUND_OFF));
+            least = least.min(von_mises.stress(&b).radius());
+        }
+    }
+    assert!(least < 24.99, "{least}: the out-of-plane stress does not show");
+    let end = von_mises.stress(&b);
+    assert!((end.radius() - 25.0).abs() < 1e-9 && (end.zz - end.plane_mean()).abs() < 1e-6, "{end:?}");
+    assert_eq!(tresca.stress(&a).zz, -80.0);
+}
+
+#[test]
+fn undrained_flow_keeps_volume() {
+    for criterion in [Criterion::Tresca, Criterion::VonMises] {
+        let clay = clay(criterion, Some(Decay::Linear));
+        let mut state = clay.initialise(isotropic(100.0), None).unwrap();
+        for _ in 0..100 {
+            advance(&clay, &mut state, &strain_of(1e-3, -1e-3, 1e-3));
+        }
+        advance(&clay, &mut state, &strain_of(-1e-3, 0.0, 0.0));
+        let expected = -300.0 - 3.0 * K * 1e-3;
+        assert!((clay.stress(&state).first_invariant() - expected).abs() < 1e-9);
+    }
+}
+
+/// Closed form of the area under the strength: the part above the residual is worth `kappa_s` (exponential) or half of
+/// it (linear).
+#[test]
+fn undrained_softening_costs_the_area_under_it() {
+    for criterion in [Criterion::Tresca, Criterion::VonMises] {
+        for decay in [Decay::Exponential, Decay::Linear] {
+            let clay = clay(criterion, Some(decay));
+            let mut state = clay.initialise(isotropic(100.0), None).unwrap();
+            let mut spent = 0.0;
+            for _ in 0..20_000 {
+                let before = clay.stress(&state);
+                let de = strain_of(0.0, 0.0, 2.5e-5);
+                advance(&clay, &mut state, &de);
+                spent += work(&before, &clay.stress(&state), &de);
+            }
+            let plastic = clay.plastic_shear_strain(&state).unwrap();
+            let strength = clay_strength(Some(decay), plastic);
+            assert!((clay.stress(&state).xy - strength).abs() < 1e-10 && strength < 5.01);
+            assert!((plastic - (0.5 - strength / G)).abs() < 1e-12);
+            let above = match decay {
+                Decay::Exponential => 20.0 * 0.05 * (1.0 - (-plastic / 0.05).exp()),
+                Decay::Linear => 20.0 * 0.05 / 2.0,
+            };
+            let expected = above + 5.0 * plastic + 0.5 * strength * strength / G;
+            assert!((spent / expected - 1.0).abs() < 1e-6, "{criterion:?} {decay:?}: {spent} {expected}");
+        }
+    }
+}
+
+#[test]
+fn moduli_are_the_elastic_ones() {
+    for Case { soil, .. } in cases() {
+        assert_eq!(soil.static_shear_modulus(), G);
+        assert_eq!(soil.small_strain_moduli(isotropic(100.0)).unwrap(), Moduli { bulk: K, shear: G });
+    }
+}
+
+#[test]
+fn impossible_strengths_are_refused() {
+    let refused = |parameters: Parameters, which: &str| {
+        let refusal = DruckerPrager::new(skeleton(), parameters);
+        let Err(SoilError::InvalidParameter { name, .. }) = refusal else {
+            panic!("{which}: {refusal:?}");
+        };
+        assert_eq!(name, which);
+    };
+    let sound = strength(10.0, 30.0, 5.0);
+    for (peak, which) in [
+        (strength(10.0, 90.0, 0.0), "phi"),
+        (strength(10.0, -1.0, 0.0), "phi"),
+        (strength(10.0, f64::NAN, 0.0), "phi"),
+        (strength(10.0, 30.0, 31.0), "psi"),
+        (strength(10.0, 30.0, -1.0), "psi"),
+        (strength(-1.0, 30.0, 0.0), "c"),
+        (strength(f64::INFINITY, 30.0, 0.0), "c"),
+        (strength(0.0, 0.0, 0.0), "c"),
+    ] {
+        refused(cone(peak, Matching::Usual), which);
+    }
+    for tension in [-1.0, 10.0 / 30.0_f64.to_radians().tan() + 0.1, f64::NAN, f64::INFINITY] {
+        let parameters = Parameters { tension_cutoff: Some(tension), ..cone(sound, Matching::Usual) };
+        refused(parameters, "tension_cutoff");
+    }
+    for (residual, strain, which) in [
+        (strength(11.0, 30.0, 5.0), 0.1, "c_residual"),
+        (strength(10.0, 31.0, 5.0), 0.1, "phi_residual"),
+        (strength(10.0, 30.0, 6.0), 0.1, "psi_residual"),
+        (strength(0.0, 0.0, 0.0), 0.1, "c_residual"),
+        (strength(1.0, 30.0, 5.0), 0.0, "softening_strain"),
+        (strength(1.0, 30.0, 5.0), 1e-5, "softening_strain"),
+        (strength(1.0, 30.0, 5.0), f64::INFINITY, "softening_strain"),
+    ] {
+        let softening = Some(Softening { residual, strain });
+        refused(Parameters { softening, ..cone(sound, Matching::Usual) }, which);
+    }
+}
