@@ -26,7 +26,6 @@ _TENSION: JsonDict = {"remedy": "leave it out for the apex c/tan(phi), 0 for soi
 _SOFTENING: JsonDict = {"remedy": "a shear strain, not a percentage: 5 % is written 0.05"}
 _UNDRAINED: JsonDict = {"remedy": "for strength that grows with pressure take DruckerPrager or MohrCoulomb"}
 _RESIDUAL: JsonDict = {"remedy": "leave it out for strength that stays"}
-_STRENGTH_NAMES = {"cohesion": "c", "friction_angle": "phi", "dilation_angle": "psi"}
 # Largest void ratio of any soil that carries load; above it the entry is a slip of units.
 _VOID_RATIO_MAX = 10.0
 # Largest critical-state friction angle of any sand, degrees; above it the entry is a slip of units.
@@ -282,7 +281,21 @@ def _require_softening_strain(residual: dict[str, float | None], softening_strai
         )
 
 
-class DruckerPrager(_Plastic):
+class _Frictional(_Plastic):
+    """A soil whose strength is cohesion and friction."""
+
+    _positional: ClassVar[tuple[str, ...]] = ("c", "phi", "psi")
+    _aliases: ClassVar[dict[str, str]] = {"cohesion": "c", "friction_angle": "phi", "dilation_angle": "psi"}
+
+    c: NonNegative = Field(description="cohesion, kPa", json_schema_extra=_COHESION)
+    phi: Number = Field(ge=0.0, lt=90.0, description="friction angle, degrees", json_schema_extra=_DEGREES)
+    psi: NonNegative = Field(default=0.0, description="dilation angle, degrees", json_schema_extra=_DILATION)
+    tension_cutoff: NonNegative | None = Field(
+        default=None, description="largest tension, kPa; default c/tan(phi)", json_schema_extra=_TENSION
+    )
+
+
+class DruckerPrager(_Frictional):
     """Drucker-Prager plasticity, non-associated, with cohesion, a tension cut-off and softening.
 
     Strength by c (kPa), phi and psi (degrees, 0 <= psi <= phi < 90), effective stress. Elasticity by G and K
@@ -296,16 +309,7 @@ class DruckerPrager(_Plastic):
     Equations and limits: docs/theory/other_models.md.
     """
 
-    _positional: ClassVar[tuple[str, ...]] = ("c", "phi", "psi")
-    _aliases: ClassVar[dict[str, str]] = _STRENGTH_NAMES
-
     kind: Literal["drucker_prager"] = "drucker_prager"
-    c: NonNegative = Field(description="cohesion, kPa", json_schema_extra=_COHESION)
-    phi: Number = Field(ge=0.0, lt=90.0, description="friction angle, degrees", json_schema_extra=_DEGREES)
-    psi: NonNegative = Field(default=0.0, description="dilation angle, degrees", json_schema_extra=_DILATION)
-    tension_cutoff: NonNegative | None = Field(
-        default=None, description="largest mean tension, kPa; default c/tan(phi)", json_schema_extra=_TENSION
-    )
     matching: Literal["usual", "general"] = "usual"
     c_residual: NonNegative | None = Field(default=None, description="cohesion after softening, kPa")
     phi_residual: NonNegative | None = Field(
@@ -345,6 +349,35 @@ class DruckerPrager(_Plastic):
     def _check_set(self) -> None:
         names = ("c_residual", "phi_residual", "psi_residual")
         _require_softening_strain({name: getattr(self, name) for name in names}, self.softening_strain)
+
+
+class MohrCoulomb(_Frictional):
+    """Mohr-Coulomb plasticity, non-associated, without hardening, with a tension cut-off.
+
+    Strength by c (kPa), phi and psi (degrees, 0 <= psi <= phi < 90), effective stress; all three principal
+    stresses count. Elasticity by G and K or by E and nu. `tension_cutoff` is the largest principal stress in
+    tension, kPa; without it the apex c/tan(phi). Long names `cohesion`, `friction_angle` and `dilation_angle`
+    are accepted. Raises :class:`InvalidInput`.
+    """
+
+    kind: Literal["mohr_coulomb"] = "mohr_coulomb"
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            c: float = ...,
+            phi: float = ...,
+            psi: float = 0.0,
+            *,
+            G: float | None = None,
+            K: float | None = None,
+            E: float | None = None,
+            nu: float | None = None,
+            tension_cutoff: float | None = None,
+            kind: str = "mohr_coulomb",
+            **long_names: float,
+        ) -> None: ...
 
 
 class TotalStress(_Plastic):
@@ -397,4 +430,6 @@ class TotalStress(_Plastic):
         _require_softening_strain({"Sr": self.Sr}, self.softening_strain)
 
 
-Material = Annotated[PM4Sand | Elastic | DruckerPrager | TotalStress, Field(discriminator="kind")]
+Material = Annotated[
+    PM4Sand | Elastic | DruckerPrager | MohrCoulomb | TotalStress, Field(discriminator="kind")
+]

@@ -6,6 +6,7 @@ use sandboil_soil::{
     Integrator, Soil, SoilError, Strength, Stress,
     drucker_prager::{self, DruckerPrager, Matching},
     elastic::Elastic,
+    mohr_coulomb::MohrCoulomb,
     pm4sand::{Options, PM4Sand, Parameters},
     total_stress::{self, Criterion, Decay, TotalStress},
 };
@@ -127,6 +128,9 @@ pub fn soil(dict: &Bound<'_, PyDict>, gap_memory: bool) -> PyResult<Soil> {
     match kind.as_str() {
         "elastic" => Ok(Soil::Elastic(elastic()?)),
         "drucker_prager" => Ok(Soil::DruckerPrager(drucker_prager(dict, elastic()?)?)),
+        "mohr_coulomb" => MohrCoulomb::new(elastic()?, strength(dict)?, optional(dict, "tension_cutoff")?)
+            .map(Soil::MohrCoulomb)
+            .map_err(|error| refused(&error)),
         "pm4sand" => Ok(Soil::PM4Sand(Box::new(pm4sand(dict, gap_memory)?))),
         "total_stress" => Ok(Soil::TotalStress(total_stress(dict, elastic()?)?)),
         other => Err(PyValueError::new_err(format!("unknown material kind {other:?}"))),

@@ -9,6 +9,7 @@ mod error;
 mod integrator;
 pub mod laboratory;
 mod model;
+pub mod mohr_coulomb;
 pub mod pm4sand;
 mod report;
 mod strength;

@@ -5,7 +5,7 @@
 
 use crate::{
     Integrator, Moduli, SoilError, StrainIncrement, Stress, UpdateReport, drucker_prager::DruckerPrager,
-    elastic::Elastic, pm4sand::PM4Sand, total_stress::TotalStress,
+    elastic::Elastic, mohr_coulomb::MohrCoulomb, pm4sand::PM4Sand, total_stress::TotalStress,
 };
 use std::fmt::Debug;
 
@@ -78,6 +78,8 @@ pub enum Soil {
     Elastic(Elastic),
     /// Drucker-Prager plasticity.
     DruckerPrager(DruckerPrager),
+    /// Mohr-Coulomb plasticity.
+    MohrCoulomb(MohrCoulomb),
     /// PM4Sand.
     PM4Sand(Box<PM4Sand>),
     /// Undrained strength on total stress.
@@ -91,6 +93,7 @@ macro_rules! with_model {
         match $soil {
             $crate::Soil::Elastic($model) => $body,
             $crate::Soil::DruckerPrager($model) => $body,
+            $crate::Soil::MohrCoulomb($model) => $body,
             $crate::Soil::PM4Sand($model) => $body,
             $crate::Soil::TotalStress($model) => $body,
         }

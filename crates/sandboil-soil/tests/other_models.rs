@@ -8,6 +8,7 @@ use point::rotated;
 use proptest::prelude::*;
 use sandboil_soil::drucker_prager::{DruckerPrager, Matching, Parameters, Softening};
 use sandboil_soil::elastic::Elastic;
+use sandboil_soil::mohr_coulomb::MohrCoulomb;
 use sandboil_soil::total_stress::{self, Criterion, Decay, TotalStress};
 use sandboil_soil::{
     Integrator, Moduli, Soil, SoilError, SoilModel, StrainIncrement, Strength, Stress, with_model,
@@ -74,16 +75,18 @@ struct Case {
     excess: Excess,
 }
 
+const STRENGTHS: [Strength; 5] = [
+    Strength { c: 14.4, phi: 31.0, psi: 0.0 },
+    Strength { c: 0.0, phi: 37.0, psi: 5.0 },
+    Strength { c: 5.0, phi: 30.0, psi: 30.0 },
+    Strength { c: 20.0, phi: 0.0, psi: 0.0 },
+    Strength { c: 1.0, phi: 89.0, psi: 0.0 },
+];
+
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for matching in [Matching::Usual, Matching::General] {
-        for peak in [
-            strength(14.4, 31.0, 0.0),
-            strength(0.0, 37.0, 5.0),
-            strength(5.0, 30.0, 30.0),
-            strength(20.0, 0.0, 0.0),
-            strength(1.0, 89.0, 0.0),
-        ] {
+        for peak in STRENGTHS {
             cases.push(Case {
                 soil: Soil::DruckerPrager(drucker_prager(peak, matching)),
                 excess: Box::new(move |stress, _| cone_excess(stress, cone_constants(peak, matching))),
@@ -100,6 +103,14 @@ fn cases() -> Vec<Case> {
             on_cone.max(stress.first_invariant() - 9.0)
         }),
     });
+    for tension_cutoff in [None, Some(0.0)] {
+        for strength in STRENGTHS {
+            cases.push(Case {
+                soil: Soil::MohrCoulomb(MohrCoulomb::new(skeleton(), strength, tension_cutoff).unwrap()),
+                excess: Box::new(move |stress, _| pyramid_excess(stress, strength, tension_cutoff)),
+            });
+        }
+    }
     for criterion in [Criterion::Tresca, Criterion::VonMises] {
         for decay in [None, Some(Decay::Exponential), Some(Decay::Linear)] {
             cases.push(Case {
@@ -111,6 +122,25 @@ fn cases() -> Vec<Case> {
         }
     }
     cases
+}
+
+/// Principal stresses from the largest, kPa.
+fn principal(stress: &Stress) -> [f64; 3] {
+    let mut principal =
+        [stress.plane_mean() + stress.radius(), stress.plane_mean() - stress.radius(), stress.zz];
+    principal.sort_by(|a, b| b.total_cmp(a));
+    principal
+}
+
+fn pyramid_excess(stress: &Stress, Strength { c, phi, .. }: Strength, tension_cutoff: Option<f64>) -> f64 {
+    let [largest, _, smallest] = principal(stress);
+    let phi = phi.to_radians();
+    let shear = 0.5 * (largest - smallest) + 0.5 * (largest + smallest) * phi.sin() - c * phi.cos();
+    shear.max(tension_cutoff.map_or(f64::NEG_INFINITY, |tension| largest - tension))
+}
+
+fn pyramid(strength: Strength) -> MohrCoulomb {
+    MohrCoulomb::new(skeleton(), strength, None).unwrap()
 }
 
 /// Undrained strength of 25 kPa that falls to 5 kPa, on the scale of 5 % plastic shear strain.
@@ -412,6 +442,18 @@ fn strength_at_failure_in_plane_strain() {
     }
 }
 
+/// Both give the same strength at failure in plane strain, whatever the dilatancy.
+#[test]
+fn mohr_coulomb_is_what_the_general_cone_becomes_at_failure() {
+    for peak in [strength(5.0, 30.0, 0.0), strength(5.0, 30.0, 30.0), strength(0.0, 37.0, 5.0)] {
+        let (pyramid, cone) = (pyramid(peak), drucker_prager(peak, Matching::General));
+        let expected = mohr_coulomb_radius(peak, -50.0);
+        for measured in [radius_at_failure(&pyramid, -50.0), radius_at_failure(&cone, -50.0)] {
+            assert!((measured / expected - 1.0).abs() < 1e-9, "{peak:?}: {measured} {expected}");
+        }
+    }
+}
+
 /// Compression along y with the lateral stress held, to the end.
 fn compressed<M: SoilModel>(model: &M, lateral: f64) -> Stress {
     let mut state = model.initialise(isotropic(-lateral), None).unwrap();
@@ -441,9 +483,12 @@ fn passive_strength(Strength { c, phi, .. }: Strength, lateral: f64) -> f64 {
 #[test]
 fn strength_in_plane_strain_compression() {
     for peak in [strength(5.0, 30.0, 10.0), strength(14.4, 31.0, 0.0), strength(0.0, 37.0, 37.0)] {
-        let stress = compressed(&drucker_prager(peak, Matching::General), -50.0);
         let expected = passive_strength(peak, -50.0);
-        assert!((stress.yy / expected - 1.0).abs() < 1e-8, "{peak:?}: {} {expected}", stress.yy);
+        for stress in
+            [compressed(&drucker_prager(peak, Matching::General), -50.0), compressed(&pyramid(peak), -50.0)]
+        {
+            assert!((stress.yy / expected - 1.0).abs() < 1e-8, "{peak:?}: {} {expected}", stress.yy);
+        }
     }
 }
 
@@ -590,29 +635,160 @@ fn brittle_softening_drops_to_the_residual() {
     assert_eq!(drops, 1);
 }
 
-/// With associated flow and convex elasticity plastic work is never negative.
+/// With associated flow plastic work is never negative.
 #[test]
 fn associated_flow_dissipates() {
-    let soil = drucker_prager(strength(5.0, 30.0, 30.0), Matching::Usual);
+    let peak = strength(5.0, 30.0, 30.0);
+    dissipates(&drucker_prager(peak, Matching::Usual));
+    dissipates(&pyramid(peak));
+    dissipates(&clay(Criterion::Tresca, Some(Decay::Linear)));
+    dissipates(&clay(Criterion::VonMises, Some(Decay::Exponential)));
+}
+
+fn dissipates<M: SoilModel>(soil: &M) {
     let inverse = |s: &Stress| {
         let mean = s.first_invariant() / 3.0;
         let strain = |component: f64| (component - mean) / (2.0 * G) + mean / (3.0 * K);
         [strain(s.xx), strain(s.yy), s.xy / G, strain(s.zz)]
     };
     let mut state = soil.initialise(isotropic(20.0), None).unwrap();
-    let mut angle = 0.0_f64;
+    let mut total = 0.0;
     for step in 0..2000 {
-        angle += 0.7;
-        let de =
-            strain_of(1e-4 * angle.cos(), -1e-4 * (1.3 * angle).cos(), 3e-4 * (0.11 * f64::from(step)).sin());
+        let at = f64::from(step);
+        let de = strain_of(1e-4 * (0.7 * at).cos(), -1e-4 * (0.91 * at).cos(), 3e-4 * (0.11 * at).sin());
         let before = soil.stress(&state);
-        advance(&soil, &mut state, &de);
+        advance(soil, &mut state, &de);
         let after = soil.stress(&state);
         let (e0, e1) = (inverse(&before), inverse(&after));
         let plastic = [de.xx, de.yy, de.xy, 0.0];
         let stress = [after.xx, after.yy, after.xy, after.zz];
         let spent: f64 = (0..4).map(|i| stress[i] * (plastic[i] - (e1[i] - e0[i]))).sum();
-        assert!(spent >= -1e-12, "{spent} kPa in step {step}");
+        assert!(spent >= -1e-12, "{soil:?}: {spent} kPa in step {step}");
+        total += spent;
+    }
+    assert!(total > 0.01, "{soil:?}: {total} kPa");
+}
+
+/// The return solves a problem with one answer: stress inside, plastic strain along the active flows with no negative
+/// share, and no flow of a plane that is not reached. A search over all combinations of planes finds the same.
+#[test]
+fn the_pyramid_returns_to_the_only_answer() {
+    let mut generator = 1_u64;
+    let mut random = move || {
+        generator = generator.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (generator >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0
+    };
+    let mut edges = 0;
+    for peak in STRENGTHS {
+        let soil = pyramid(peak);
+        for _ in 0..2000 {
+            let start = Stress {
+                xx: 100.0 * random(),
+                yy: 100.0 * random(),
+                xy: 50.0 * random(),
+                zz: 100.0 * random(),
+            };
+            let mut state = soil.initialise(start, None).unwrap();
+            let de = strain_of(2e-3 * random(), 2e-3 * random(), 2e-3 * random());
+            let trial = skeleton().moved(&state, &de);
+            advance(&soil, &mut state, &de);
+            let expected = searched(principal(&trial), peak);
+            let found = principal(&state);
+            let size = size_of(&trial);
+            for (ours, theirs) in found.into_iter().zip(expected) {
+                assert!((ours - theirs).abs() <= 1e-9 * size, "{peak:?} {trial:?}: {found:?} {expected:?}");
+            }
+            let [largest, middle, smallest] = found;
+            let on_edge =
+                (largest - middle).min(middle - smallest) < 1e-9 * size && largest - smallest > 1e-6;
+            edges += i32::from(on_edge);
+            // The principal directions in the plane stay.
+            let (before, after) = (trial.plane_deviator(), state.plane_deviator());
+            let cross = before.half_difference * after.xy - before.xy * after.half_difference;
+            assert!(cross.abs() <= 1e-9 * size * size);
+        }
+    }
+    assert!(edges > 500, "{edges} returns to an edge");
+}
+
+/// Principal stresses admitted for ordered trial ones, from the flow rule alone: of one plane, of two, of all three at
+/// the apex.
+fn searched(trial: [f64; 3], Strength { c, phi, psi }: Strength) -> [f64; 3] {
+    let (sin, cos) = phi.to_radians().sin_cos();
+    let dilation = psi.to_radians().sin();
+    let planes = [(0, 2), (0, 1), (1, 2)];
+    let excess = |s: &[f64; 3], (i, j): (usize, usize)| s[i] - s[j] + (s[i] + s[j]) * sin - 2.0 * c * cos;
+    let fall = |(i, j): (usize, usize)| {
+        let mut flow = [0.0; 3];
+        flow[i] = 1.0 + dilation;
+        flow[j] = dilation - 1.0;
+        let volume: f64 = flow.iter().sum();
+        flow.map(|share| 2.0 * G * share + (K - 2.0 / 3.0 * G) * volume)
+    };
+    let size = trial.iter().fold(1.0_f64, |most, s| most.max(s.abs()));
+    let inside = |s: &[f64; 3]| {
+        planes.iter().chain(&[(1, 0), (2, 0), (2, 1)]).all(|plane| excess(s, *plane) <= 1e-10 * size)
+    };
+    if inside(&trial) {
+        return trial;
+    }
+    let moved = |flows: &[((usize, usize), f64)]| {
+        let mut s = trial;
+        for (plane, share) in flows {
+            for (stress, fall) in s.iter_mut().zip(fall(*plane)) {
+                *stress -= share * fall;
+            }
+        }
+        s
+    };
+    let effect =
+        |on: (usize, usize), of: (usize, usize)| excess(&trial, on) - excess(&moved(&[(of, 1.0)]), on);
+    for plane in planes {
+        let share = excess(&trial, plane) / effect(plane, plane);
+        let s = moved(&[(plane, share)]);
+        if share >= 0.0 && inside(&s) {
+            return s;
+        }
+    }
+    for (a, b) in [(planes[0], planes[1]), (planes[0], planes[2])] {
+        let determinant = effect(a, a) * effect(b, b) - effect(a, b) * effect(b, a);
+        let (fa, fb) = (excess(&trial, a), excess(&trial, b));
+        let x = (fa * effect(b, b) - fb * effect(a, b)) / determinant;
+        let y = (fb * effect(a, a) - fa * effect(b, a)) / determinant;
+        let s = moved(&[(a, x), (b, y)]);
+        if x >= 0.0 && y >= 0.0 && inside(&s) {
+            return s;
+        }
+    }
+    [c * cos / sin; 3]
+}
+
+/// An out-of-plane stress that is the smallest flows as an in-plane one would.
+#[test]
+fn the_out_of_plane_stress_may_decide() {
+    let peak = strength(5.0, 30.0, 0.0);
+    let soil = pyramid(peak);
+    let start = Stress { xx: -50.0, yy: -50.0, xy: 0.0, zz: passive_strength(peak, -50.0) };
+    let mut state = soil.initialise(start, None).unwrap();
+    assert!(difference(&state, &start) < 1e-10);
+    // Stretching the plane unloads its stresses: the out-of-plane one must follow.
+    advance(&soil, &mut state, &strain_of(2e-5, 2e-5, 0.0));
+    assert!(state.xx > -50.0 && (state.zz - passive_strength(peak, state.xx)).abs() < 1e-9, "{state:?}");
+    assert!((state.xx - state.yy).abs() < 1e-10);
+}
+
+#[test]
+fn the_pyramid_ends_at_its_apex_or_cut_off() {
+    let peak = strength(14.4, 31.0, 10.0);
+    let apex = 14.4 / 31.0_f64.to_radians().tan();
+    for (cutoff, tension) in [(None, apex), (Some(10.0), 10.0), (Some(0.0), 0.0)] {
+        let soil = MohrCoulomb::new(skeleton(), peak, cutoff).unwrap();
+        let mut state = soil.initialise(isotropic(20.0), None).unwrap();
+        advance(&soil, &mut state, &strain_of(0.01, 0.01, 0.001));
+        assert!(difference(&state, &isotropic(-tension)) < 1e-10, "{state:?}");
+    }
+    for tension in [-1.0, apex + 0.1, f64::NAN] {
+        assert!(MohrCoulomb::new(skeleton(), peak, Some(tension)).is_err());
     }
 }
 

@@ -1,0 +1,160 @@
+//! Mohr-Coulomb plasticity in plane strain: elastic, perfectly plastic, non-associated, with a tension cut-off.
+//!
+//! All three principal stresses count: two lie in the plane, the third is the out-of-plane stress, which may be the
+//! largest or the smallest. The return to the surface is exact, to a plane, an edge or the apex of the pyramid, in
+//! principal stresses (de Souza Neto, Peric and Owen 2008, chapter 8).
+
+use crate::{
+    Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Strength, Stress, UpdateReport,
+    elastic::Elastic,
+};
+
+/// Mohr-Coulomb material.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MohrCoulomb {
+    elastic: Elastic,
+    sin_phi: f64,
+    sin_psi: f64,
+    /// `2 c cos(phi)`, kPa.
+    cohesion: f64,
+    /// Largest principal stress, kPa: the apex without a cut-off, infinite without friction.
+    tension: f64,
+}
+
+/// Principal stresses from the largest, tension positive, kPa.
+type Principal = [f64; 3];
+
+impl MohrCoulomb {
+    /// Material with elastic constants, strength, and the largest principal tension, kPa (`None`: that of the apex,
+    /// `c cot(phi)`).
+    pub fn new(elastic: Elastic, strength: Strength, tension_cutoff: Option<f64>) -> Result<Self, SoilError> {
+        let strength = strength.checked(["c", "phi", "psi"])?;
+        let (sin_phi, cos_phi) = strength.phi.to_radians().sin_cos();
+        let tension = strength.tension_cutoff(tension_cutoff)?.min(strength.c * cos_phi / sin_phi);
+        let sin_psi = strength.psi.to_radians().sin();
+        Ok(Self { elastic, sin_phi, sin_psi, cohesion: 2.0 * strength.c * cos_phi, tension })
+    }
+
+    /// `(s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi)`, kPa.
+    fn excess(&self, largest: f64, smallest: f64) -> f64 {
+        (largest - smallest) + (largest + smallest) * self.sin_phi - self.cohesion
+    }
+
+    /// Largest principal stress that the surface admits with the smallest one, kPa.
+    fn largest_with(&self, smallest: f64) -> f64 {
+        (smallest * (1.0 - self.sin_phi) + self.cohesion) / (1.0 + self.sin_phi)
+    }
+
+    /// Principal stresses after the return of ordered trial ones, with the flow of a dilation angle.
+    fn admissible(&self, trial: Principal, sin_psi: f64) -> Principal {
+        let [s1, s2, s3] = trial;
+        let excess = self.excess(s1, s3);
+        if excess <= 0.0 {
+            return trial;
+        }
+        let Moduli { bulk, shear } = self.elastic.constants();
+        // Falls of the stresses per unit of flow on the plane of the largest and the smallest one: `along` on all
+        // three, and what shear adds to the outer two.
+        let along = 2.0 * (bulk - 2.0 / 3.0 * shear) * sin_psi;
+        let (on_largest, on_smallest) = (2.0 * shear * (1.0 + sin_psi), -2.0 * shear * (1.0 - sin_psi));
+        // Fall of a plane's excess by its own flow, by that of the plane with which it shares the largest stress,
+        // and by that of the plane with which it shares the smallest.
+        let (plus, minus) = (1.0 + self.sin_phi, 1.0 - self.sin_phi);
+        let common = 2.0 * along * self.sin_phi;
+        let shares_largest = common + on_largest * plus;
+        let shares_smallest = common - on_smallest * minus;
+        let own = common + on_largest * plus - on_smallest * minus;
+
+        let flow = excess / own;
+        let smallest = s3 - flow * (along + on_smallest);
+        let middle = s2 - flow * along;
+        let largest = self.largest_with(smallest);
+        if smallest <= middle && middle <= largest {
+            return [largest, middle, smallest];
+        }
+        // Flow of two planes at once: `own x + shared y = f_x`, `shared x + own y = f_y`.
+        let both = |other: f64, shared: f64| (excess + other) / (own + shared);
+        if (1.0 - sin_psi) * s1 - 2.0 * s2 + (1.0 + sin_psi) * s3 > 0.0 {
+            // The edge where the middle stress is the smallest.
+            let sum = both(self.excess(s1, s2), shares_largest);
+            let smallest = 0.5 * (s2 + s3) - sum * (along + 0.5 * on_smallest);
+            let largest = self.largest_with(smallest);
+            if smallest <= largest {
+                return [largest, smallest, smallest];
+            }
+        } else {
+            // The edge where it is the largest.
+            let sum = both(self.excess(s2, s3), shares_smallest);
+            let smallest = s3 - sum * (along + on_smallest);
+            let largest = self.largest_with(smallest);
+            if smallest <= largest {
+                return [largest, largest, smallest];
+            }
+        }
+        [self.cohesion / (2.0 * self.sin_phi); 3]
+    }
+
+    /// Stress after the return of a trial one. Tension above the cut-off is then cut from each principal stress by
+    /// itself.
+    fn returned(&self, trial: &Stress, sin_psi: f64) -> Stress {
+        let (mean, radius, zz) = (trial.plane_mean(), trial.radius(), trial.zz);
+        let (upper, lower) = (mean + radius, mean - radius);
+        // Where the out-of-plane stress stands among the three.
+        let place = if zz > upper {
+            0
+        } else if zz >= lower {
+            1
+        } else {
+            2
+        };
+        let ordered = match place {
+            0 => [zz, upper, lower],
+            1 => [upper, zz, lower],
+            _ => [upper, lower, zz],
+        };
+        let admitted = self.admissible(ordered, sin_psi).map(|stress| stress.min(self.tension));
+        if admitted == ordered {
+            return *trial;
+        }
+        let (upper, lower) = match place {
+            0 => (admitted[1], admitted[2]),
+            1 => (admitted[0], admitted[2]),
+            _ => (admitted[0], admitted[1]),
+        };
+        let factor = if radius > 0.0 { 0.5 * (upper - lower) / radius } else { 0.0 };
+        Stress::of_plane(0.5 * (upper + lower), trial.plane_deviator() * factor, admitted[place])
+    }
+}
+
+impl SoilModel for MohrCoulomb {
+    type State = Stress;
+
+    /// A stress outside keeps its mean, or the largest one admitted, and loses the shear that is too much.
+    fn initialise(&self, stress: Stress, _void_ratio: Option<f64>) -> Result<Stress, SoilError> {
+        self.returned(&stress.finite("initial stress")?, 0.0).finite("initial stress")
+    }
+
+    fn update(
+        &self,
+        state: &mut Stress,
+        de: &StrainIncrement,
+        _integrator: &Integrator,
+    ) -> Result<UpdateReport, SoilError> {
+        de.bounded()?;
+        let trial = self.elastic.moved(state, de);
+        *state = self.returned(&trial, self.sin_psi).finite("stress")?;
+        Ok(UpdateReport::default())
+    }
+
+    fn stress(&self, state: &Stress) -> Stress {
+        *state
+    }
+
+    fn moduli(&self, _state: &Stress) -> Moduli {
+        self.elastic.constants()
+    }
+
+    fn static_shear_modulus(&self) -> f64 {
+        self.elastic.constants().shear
+    }
+}
