@@ -8,7 +8,7 @@ from . import lab
 from ._core import __version__
 from ._errors import InvalidInput, RunInterrupted, SandboilError, SimulationDiverged
 from .discretise import Discretisation, discretise
-from .materials import DruckerPrager, Elastic, MohrCoulomb, PM4Sand, TotalStress
+from .materials import DruckerPrager, Elastic, MohrCoulomb, PM4Sand, PressureElastic, TotalStress
 from .motion import Motion, ResponseSpectrum, response_spectrum
 from .plan import Plan
 from .results import History, Profile, Run, Summary, Surface, load
@@ -50,6 +50,7 @@ __all__ = [
     "Periodic",
     "Plan",
     "Polygon",
+    "PressureElastic",
     "Profile",
     "Region",
     "ResponseSpectrum",

@@ -24,6 +24,7 @@ _COHESION: JsonDict = {
 }
 _TENSION: JsonDict = {"remedy": "leave it out for the apex c/tan(phi), 0 for soil that bears no tension"}
 _SOFTENING: JsonDict = {"remedy": "a shear strain, not a percentage: 5 % is written 0.05"}
+_EXPONENT: JsonDict = {"remedy": "about 0.5 for sand; 0 is Elastic"}
 _UNDRAINED: JsonDict = {"remedy": "for strength that grows with pressure take DruckerPrager or MohrCoulomb"}
 _RESIDUAL: JsonDict = {"remedy": "leave it out for strength that stays"}
 # Largest void ratio of any soil that carries load; above it the entry is a slip of units.
@@ -245,6 +246,37 @@ class Elastic(_Skeleton):
         ) -> None: ...
 
 
+class PressureElastic(_Skeleton):
+    """Elasticity stiffened by the pressure at rest: G = G_ref (p'/p_ref)^exponent, nu constant.
+
+    G and K, or E and nu, are those at the mean effective stress `p_ref` (kPa, compression positive). Every
+    point takes its moduli from its stress when shaking begins and keeps them, so a closed cycle of load costs
+    no energy. p' counts as 1 % of `p_ref` at least. Raises :class:`InvalidInput`.
+    """
+
+    _positional: ClassVar[tuple[str, ...]] = ("G", "K")
+
+    kind: Literal["pressure_elastic"] = "pressure_elastic"
+    exponent: Number = Field(
+        default=0.5, ge=0.0, le=1.0, description="exponent of pressure", json_schema_extra=_EXPONENT
+    )
+    p_ref: Positive = Field(default=101.3, description="pressure at which the moduli are given, kPa")
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            G: float | None = None,
+            K: float | None = None,
+            *,
+            E: float | None = None,
+            nu: float | None = None,
+            exponent: float = 0.5,
+            p_ref: float = 101.3,
+            kind: str = "pressure_elastic",
+        ) -> None: ...
+
+
 class _Plastic(_Skeleton):
     """A soil with strength. What parameters must be to each other the numerical core knows, and is asked."""
 
@@ -431,5 +463,6 @@ class TotalStress(_Plastic):
 
 
 Material = Annotated[
-    PM4Sand | Elastic | DruckerPrager | MohrCoulomb | TotalStress, Field(discriminator="kind")
+    PM4Sand | Elastic | PressureElastic | DruckerPrager | MohrCoulomb | TotalStress,
+    Field(discriminator="kind"),
 ]

@@ -8,6 +8,7 @@ use sandboil_soil::{
     elastic::Elastic,
     mohr_coulomb::MohrCoulomb,
     pm4sand::{Options, PM4Sand, Parameters},
+    pressure_elastic::PressureElastic,
     total_stress::{self, Criterion, Decay, TotalStress},
 };
 use sandboil_solver::SolverError;
@@ -132,6 +133,11 @@ pub fn soil(dict: &Bound<'_, PyDict>, gap_memory: bool) -> PyResult<Soil> {
             .map(Soil::MohrCoulomb)
             .map_err(|error| refused(&error)),
         "pm4sand" => Ok(Soil::PM4Sand(Box::new(pm4sand(dict, gap_memory)?))),
+        "pressure_elastic" => {
+            PressureElastic::new(elastic()?, required(dict, "exponent")?, required(dict, "p_ref")?)
+                .map(Soil::PressureElastic)
+                .map_err(|error| refused(&error))
+        }
         "total_stress" => Ok(Soil::TotalStress(total_stress(dict, elastic()?)?)),
         other => Err(PyValueError::new_err(format!("unknown material kind {other:?}"))),
     }

@@ -57,6 +57,7 @@ impl SoilModel for Elastic {
         de: &StrainIncrement,
         _integrator: &Integrator,
     ) -> Result<UpdateReport, SoilError> {
+        de.bounded()?;
         *state = self.moved(state, de).finite("stress")?;
         Ok(UpdateReport::default())
     }

@@ -11,6 +11,7 @@ pub mod laboratory;
 mod model;
 pub mod mohr_coulomb;
 pub mod pm4sand;
+pub mod pressure_elastic;
 mod report;
 mod strength;
 mod tensor;

@@ -5,7 +5,8 @@
 
 use crate::{
     Integrator, Moduli, SoilError, StrainIncrement, Stress, UpdateReport, drucker_prager::DruckerPrager,
-    elastic::Elastic, mohr_coulomb::MohrCoulomb, pm4sand::PM4Sand, total_stress::TotalStress,
+    elastic::Elastic, mohr_coulomb::MohrCoulomb, pm4sand::PM4Sand, pressure_elastic::PressureElastic,
+    total_stress::TotalStress,
 };
 use std::fmt::Debug;
 
@@ -82,6 +83,8 @@ pub enum Soil {
     MohrCoulomb(MohrCoulomb),
     /// PM4Sand.
     PM4Sand(Box<PM4Sand>),
+    /// Elasticity stiffened by the pressure at rest.
+    PressureElastic(PressureElastic),
     /// Undrained strength on total stress.
     TotalStress(TotalStress),
 }
@@ -95,6 +98,7 @@ macro_rules! with_model {
             $crate::Soil::DruckerPrager($model) => $body,
             $crate::Soil::MohrCoulomb($model) => $body,
             $crate::Soil::PM4Sand($model) => $body,
+            $crate::Soil::PressureElastic($model) => $body,
             $crate::Soil::TotalStress($model) => $body,
         }
     };

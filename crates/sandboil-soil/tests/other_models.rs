@@ -9,6 +9,7 @@ use proptest::prelude::*;
 use sandboil_soil::drucker_prager::{DruckerPrager, Matching, Parameters, Softening};
 use sandboil_soil::elastic::Elastic;
 use sandboil_soil::mohr_coulomb::MohrCoulomb;
+use sandboil_soil::pressure_elastic::PressureElastic;
 use sandboil_soil::total_stress::{self, Criterion, Decay, TotalStress};
 use sandboil_soil::{
     Integrator, Moduli, Soil, SoilError, SoilModel, StrainIncrement, Strength, Stress, with_model,
@@ -103,6 +104,12 @@ fn cases() -> Vec<Case> {
             on_cone.max(stress.first_invariant() - 9.0)
         }),
     });
+    // Elasticity has no surface.
+    cases.push(Case { soil: Soil::Elastic(skeleton()), excess: Box::new(|_, _| f64::NEG_INFINITY) });
+    cases.push(Case {
+        soil: Soil::PressureElastic(pressure_elastic()),
+        excess: Box::new(|_, _| f64::NEG_INFINITY),
+    });
     for tension_cutoff in [None, Some(0.0)] {
         for strength in STRENGTHS {
             cases.push(Case {
@@ -122,6 +129,11 @@ fn cases() -> Vec<Case> {
         }
     }
     cases
+}
+
+/// With the moduli of the others at 100 kPa.
+fn pressure_elastic() -> PressureElastic {
+    PressureElastic::new(skeleton(), 0.5, 100.0).unwrap()
 }
 
 /// Principal stresses from the largest, kPa.
@@ -321,6 +333,30 @@ proptest! {
         for Case { soil, .. } in cases() {
             with_model!(&soil, model => is_indifferent(model, start, &path)?);
         }
+    }
+}
+
+/// Work of a closed strain path, over what was exchanged along it: none, though pressure comes and goes.
+#[test]
+fn closed_loops_inside_the_surface_cost_no_energy() {
+    for Case { soil, .. } in cases() {
+        with_model!(&soil, model => {
+            let mut state = model.initialise(isotropic(100.0), None).unwrap();
+            let (mut spent, mut exchanged) = (0.0, 0.0);
+            // Compression, where no surface is near.
+            let corners = [(-3.0, -3.0, 0.0), (-3.0, -3.0, 1.0), (-1.0, -1.0, 0.5), (0.0, 0.0, 0.0)];
+            let mut at = (0.0, 0.0, 0.0);
+            for corner in corners {
+                let de = strain_of(1e-5 * (corner.0 - at.0), 1e-5 * (corner.1 - at.1), 1e-5 * (corner.2 - at.2));
+                let before = model.stress(&state);
+                advance(model, &mut state, &de);
+                let done = work(&before, &model.stress(&state), &de);
+                spent += done;
+                exchanged += done.abs();
+                at = corner;
+            }
+            assert!(spent.abs() <= 1e-13 * exchanged && exchanged > 1e-3, "{model:?}: {spent} {exchanged}");
+        });
     }
 }
 
