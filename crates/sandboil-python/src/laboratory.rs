@@ -106,6 +106,18 @@ impl Point for PythonPoint {
     fn reconsolidate(&mut self) -> bool {
         false
     }
+
+    fn copy(&self) -> Box<dyn Point> {
+        Python::attach(|py| {
+            Box::new(Self {
+                model: self.model.clone_ref(py),
+                state: self.state.clone_ref(py),
+                marked: self.marked.clone_ref(py),
+                raised: self.raised.clone(),
+                ..*self
+            })
+        })
+    }
 }
 
 /// A material point under test. Stresses in kPa, tension positive; strains tension positive, shear engineering.
@@ -193,6 +205,11 @@ impl Specimen {
         let path = Path { by_stress, rows, strain_step };
         let record = Record::new(Resolution { stress: stress_resolution, strain: strain_resolution });
         self.run(py, record, move |specimen, record, stop| specimen.path(&path, record, stop))
+    }
+
+    /// Another specimen in the same state, to go on with while this one stays.
+    fn copy(&self) -> Self {
+        Self { inner: self.inner.copy(), raised: self.raised.clone() }
     }
 
     /// Switches to reconsolidation after shaking; returns whether the model makes a difference.

@@ -7,16 +7,22 @@ engineering. `docs/laboratory.md` tells what each test does.
 
 from . import correlations
 from ._calibration import Calibration, CalibrationWarning, calibrate_hpo, calibration
+from ._modulus import modulus_reduction
+from ._paths import plane_strain_compression, reconsolidation, strain_path, stress_path
 from ._resistance import FactorCurve, ResistanceCurve, crr, crr_curve, k_alpha, k_sigma
-from ._results import CyclicTest, ShearTest
+from ._results import CompressionTest, CyclicTest, ModulusReduction, PathTest, Reconsolidation, ShearTest
 from ._shear import cyclic_dss, monotonic_dss
 from ._specimen import SoilModel
 
 __all__ = [
     "Calibration",
     "CalibrationWarning",
+    "CompressionTest",
     "CyclicTest",
     "FactorCurve",
+    "ModulusReduction",
+    "PathTest",
+    "Reconsolidation",
     "ResistanceCurve",
     "ShearTest",
     "SoilModel",
@@ -28,5 +34,10 @@ __all__ = [
     "cyclic_dss",
     "k_alpha",
     "k_sigma",
+    "modulus_reduction",
     "monotonic_dss",
+    "plane_strain_compression",
+    "reconsolidation",
+    "strain_path",
+    "stress_path",
 ]

@@ -15,6 +15,7 @@ from pydantic import Field, PlainValidator, create_model
 from .._model import Model, Number
 from ..discretise import Floats
 from . import _specimen
+from ._results import ShearTest
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -48,6 +49,26 @@ def _as_path(value: object) -> Floats:
     return array
 
 
+def _as_strain_path(value: object) -> Floats:
+    path = _as_path(value)
+    if np.abs(path).max() > _STRAIN_MAX:
+        raise ValueError(f"must lie within {_STRAIN_MAX:g}: strains are fractions, 5 % is written 0.05")
+    return path
+
+
+def _as_amplitudes(value: object) -> Floats:
+    strains = _as_series(value)
+    if not ((strains > 0.0) & (strains <= _STRAIN_MAX)).all():
+        raise ValueError(f"must lie in (0, {_STRAIN_MAX:g}]: strains are fractions, 1 % is written 0.01")
+    return strains
+
+
+def _as_tested(value: object) -> ShearTest:
+    if not isinstance(value, ShearTest) or value.specimen is None:
+        raise ValueError("must be a test of sb.lab.cyclic_dss or sb.lab.monotonic_dss, with its specimen")
+    return value
+
+
 def _as_stress(value: object) -> Floats:
     array = _finite(value, 1, "3 or 4 components xx, yy, xy and zz")
     if len(array) not in (3, 4):
@@ -68,10 +89,11 @@ Limit = Annotated[
     Field(
         gt=0.0,
         le=_STRAIN_MAX,
-        description="a strain, 1",
+        description="engineering shear strain, 1",
         json_schema_extra={"remedy": "it is a fraction, not a percentage: 5 % is written 0.05"},
     ),
 ]
+AxialStrain = Annotated[Number, Field(gt=0.0, lt=_STRAIN_MAX, description="compression, 1")]
 Count = Annotated[int, Field(strict=True, ge=1)]
 Integrator = Literal["default", "rk4", "reference"]
 Tolerance = (
@@ -80,6 +102,9 @@ Tolerance = (
 )
 Series = Annotated[ArrayLike, PlainValidator(_as_series)]
 Path = Annotated[ArrayLike, PlainValidator(_as_path)]
+StrainPath = Annotated[ArrayLike, PlainValidator(_as_strain_path)]
+Amplitudes = Annotated[ArrayLike, PlainValidator(_as_amplitudes)]
+Tested = Annotated[ShearTest, PlainValidator(_as_tested)]
 Stress = Annotated[ArrayLike, PlainValidator(_as_stress)]
 
 

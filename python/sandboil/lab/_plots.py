@@ -13,8 +13,10 @@ from matplotlib.figure import Figure
 from .._errors import InvalidInput
 from .._style import OURS, REFERENCE, STYLE
 from ..discretise import Floats
-from ._results import CyclicTest, ShearTest
+from ._results import CyclicTest, ModulusReduction, Record, ShearTest
 
+# End of an axis over its largest value.
+_MARGIN = 1.05
 # Each quantity: its label, and the factor from the record to the paper.
 _QUANTITIES = {
     "gamma": ("shear strain, %", 100.0),
@@ -23,6 +25,8 @@ _QUANTITIES = {
     "r_u": ("excess pore pressure ratio, 1", 1.0),
     "eps_v": ("contraction, %", 100.0),
     "cycle": ("cycles, 1", 1.0),
+    "G_ratio": ("$G/G_{max}$, 1", 1.0),
+    "damping": ("damping ratio, %", 100.0),
 }
 
 
@@ -47,8 +51,18 @@ def monotonic(test: ShearTest, reference: object | None) -> Figure:
     return _drawn(test, reference, panels, (1, 3))
 
 
+def modulus(test: ModulusReduction, reference: object | None) -> Figure:
+    """Modulus ratio and damping ratio over strain."""
+    figure = _drawn(test, reference, [("gamma", "G_ratio"), ("gamma", "damping")], (1, 2))
+    for axes in figure.axes:
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.set_ylim(bottom=0.0)
+    return figure
+
+
 def _drawn(
-    test: ShearTest, reference: object | None, panels: list[tuple[str, str]], shape: tuple[int, int]
+    test: Record, reference: object | None, panels: list[tuple[str, str]], shape: tuple[int, int]
 ) -> Figure:
     rows, columns = shape
     with mpl.rc_context(STYLE):
@@ -60,9 +74,9 @@ def _drawn(
             (x, y) = names
             axes.set(xlabel=_QUANTITIES[x][0], ylabel=_QUANTITIES[y][0])
             if x in ("sigma_v_eff", "cycle"):
-                axes.set_xlim(left=0.0)
+                axes.set_xlim(0.0, _MARGIN * axes.dataLim.x1)
         if reference is not None:
-            figure.axes[0].legend(loc="best")
+            figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
     return figure
 
 

@@ -184,3 +184,125 @@ class CyclicTest(ShearTest):
         from ._plots import cyclic
 
         return cyclic(self, reference)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PathTest(Record):
+    """A path of strain or of stress, one row for each that was asked for; tension positive.
+
+    An incomplete test has fewer rows, and its last one is where the soil gave up.
+
+    Attributes
+    ----------
+    strain : xx, yy and engineering xy, 1, shape (n, 3)
+    stress : effective, xx, yy and xy, kPa, shape (n, 3)
+    stress_zz : out of the plane, kPa, shape (n,)
+    void_ratio : shape (n,); nan for models that have none
+    """
+
+    strain: Floats
+    stress: Floats
+    stress_zz: Floats
+    void_ratio: Floats
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every component by its name."""
+        return {
+            **dict(zip(("eps_xx", "eps_yy", "gamma_xy"), self.strain.T, strict=True)),
+            **dict(zip(("sig_xx", "sig_yy", "tau_xy"), self.stress.T, strict=True)),
+            "sig_zz": self.stress_zz,
+            "void_ratio": self.void_ratio,
+        }
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CompressionTest(Record):
+    """Compression in plane strain. Each array has shape (n,); compression and contraction positive.
+
+    Attributes
+    ----------
+    axial_strain : vertical strain, 1
+    sigma_v_eff, sigma_h_eff : vertical and horizontal effective stress, kPa
+    eps_v : volumetric strain, 1
+    void_ratio : nan for models that have none
+    """
+
+    axial_strain: Floats
+    sigma_v_eff: Floats
+    sigma_h_eff: Floats
+    eps_v: Floats
+    void_ratio: Floats
+
+    @property
+    def p(self) -> Floats:
+        """Mean effective stress in the plane, kPa."""
+        return 0.5 * (self.sigma_v_eff + self.sigma_h_eff)
+
+    @property
+    def q(self) -> Floats:
+        """Stress difference, vertical less horizontal, kPa."""
+        return self.sigma_v_eff - self.sigma_h_eff
+
+    @property
+    def excess_pore_pressure(self) -> Floats:
+        """Excess pore pressure where the total lateral stress is held, kPa; 0 in a drained test."""
+        pressure: Floats = self.sigma_h_eff[0] - self.sigma_h_eff
+        return pressure
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        return [*super()._names(), "p", "q", "excess_pore_pressure"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Reconsolidation(Record):
+    """Dissipation after shear. Each array has shape (n,).
+
+    Attributes
+    ----------
+    sigma_v_eff, sigma_h_eff : vertical and horizontal effective stress, kPa, compression positive
+    eps_v : volumetric strain since the dissipation began, 1, contraction positive
+    gamma : engineering shear strain since the start of the shear test, 1
+    tau : shear stress, kPa
+    void_ratio : nan for models that have none
+    """
+
+    sigma_v_eff: Floats
+    sigma_h_eff: Floats
+    eps_v: Floats
+    gamma: Floats
+    tau: Floats
+    void_ratio: Floats
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ModulusReduction(Record):
+    """Secant shear modulus and damping over strain. Each array has shape (n,).
+
+    Attributes
+    ----------
+    gamma : amplitude of the engineering shear strain, 1
+    G : secant shear modulus, kPa
+    damping : damping ratio, 1
+    G_max : elastic shear modulus at the start, kPa
+    """
+
+    gamma: Floats
+    G: Floats
+    damping: Floats
+    G_max: float
+
+    @property
+    def G_ratio(self) -> Floats:
+        """G over G_max, 1."""
+        return self.G / self.G_max
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        return [*super()._names(), "G_ratio"]
+
+    def plot(self, reference: object | None = None) -> Figure:
+        """Modulus ratio and damping over strain; `reference` has `gamma`, `G_ratio` and `damping`."""
+        from ._plots import modulus
+
+        return modulus(self, reference)

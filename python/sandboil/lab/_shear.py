@@ -119,7 +119,7 @@ def cyclic_dss(
     if record["turns"][-1] == 0:
         limit += " before the first turn"
     return CyclicTest(
-        **_columns(record),
+        **shear_columns(record),
         cycle=record["cycle"],
         turns=record["turns"],
         sigma_v0=sigma_v0,
@@ -155,7 +155,7 @@ def monotonic_dss(
     )
     record, ending = sheared(specimen, [("strain", gamma_max)], drained=drained, sigma_v0=sigma_v0)
     return ShearTest(
-        **_columns(record),
+        **shear_columns(record),
         sigma_v0=sigma_v0,
         specimen=specimen,
         complete=ending == "complete",
@@ -186,7 +186,7 @@ def sheared(
     )
 
 
-def _columns(record: dict[str, NDArray[Any]]) -> dict[str, Any]:
+def shear_columns(record: dict[str, NDArray[Any]]) -> dict[str, Any]:
     """The core's record, tension positive, as a :class:`ShearTest` has it."""
     strain, stress = record["strain"], record["stress"]
     return {
@@ -231,7 +231,7 @@ def _largest_shear_ratio(sand: PM4Sand, specimen: _core.Specimen, drained: bool)
 
     A stress ratio q/p = M mobilises sin(phi) = M/2, under which no plane carries more than tan(phi). At
     constant volume dense sand dilates until it is at critical state, where p follows from its density
-    (Boulanger and Ziotopoulou 2017, section 2.2).
+    (Boulanger and Ziotopoulou 2017).
     """
     void_ratio = specimen.void_ratio
     assert void_ratio is not None

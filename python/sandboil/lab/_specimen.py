@@ -10,6 +10,9 @@ import typing
 from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from .. import _core
 from .._errors import InvalidInput
 from ..materials import Material, PM4Sand
@@ -126,6 +129,43 @@ def consolidated(
             "test begins",
         )
     return specimen(where, soil, stress(sigma_v0, K0, static_shear_ratio), void_ratio, integrator, tolerance)
+
+
+def under_stress(
+    where: str,
+    soil: Soil,
+    stress0: ArrayLike,
+    void_ratio: float | None,
+    integrator: str,
+    tolerance: float | None,
+) -> _core.Specimen:
+    """A specimen under a tensor of effective stress xx, yy, xy and perhaps zz, kPa, tension positive.
+
+    Raises :class:`InvalidInput`, with `where` before the argument's name, if the soil cannot carry that.
+    """
+    given = np.asarray(stress0, dtype=np.float64)
+    xx, yy, xy, zz = (*given.tolist(), given[0])[:4]
+    mean = 0.5 * (xx + yy)
+
+    def carried(share: float) -> bool:
+        return carries(soil, (mean + share * (xx - mean), mean + share * (yy - mean), share * xy, zz))
+
+    if not carried(1.0):
+        path, shown = f"{where}.stress0", tuple(given.tolist())
+        if not carried(0.0):
+            raise InvalidInput(
+                path,
+                shown,
+                "must be compression in the mean, xx + yy < 0, that the soil can carry",
+                "tension is positive here: compression has a minus sign",
+            )
+        raise InvalidInput(
+            path,
+            shown,
+            f"must be {_edge(carried, 0.0, 1.0):.3f} times that far from isotropic, or nearer: "
+            "this soil carries no more",
+        )
+    return specimen(where, soil, (xx, yy, xy, zz), void_ratio, integrator, tolerance)
 
 
 def specimen(

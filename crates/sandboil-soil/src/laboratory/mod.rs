@@ -91,6 +91,12 @@ impl Specimen {
         self.point.reconsolidate()
     }
 
+    /// Another specimen in the same state, to go on with while this one stays.
+    #[must_use]
+    pub fn copy(&self) -> Self {
+        Self { point: self.point.copy(), ..*self }
+    }
+
     fn row(&self, cycle: f64, turns: usize) -> Row {
         Row { strain: self.strain, stress: self.stress(), void_ratio: self.point.void_ratio(), cycle, turns }
     }

@@ -23,9 +23,12 @@ pub trait Point: Send + Sync {
     fn plastic_shear_strain(&self) -> Option<f64>;
     /// Switches to reconsolidation after shaking; returns whether the model makes a difference.
     fn reconsolidate(&mut self) -> bool;
+    /// Another point in the same state.
+    fn copy(&self) -> Box<dyn Point>;
 }
 
 /// A [`SoilModel`] with a state of it.
+#[derive(Clone)]
 pub(super) struct ModelPoint<M: SoilModel> {
     model: M,
     state: M::State,
@@ -38,7 +41,7 @@ impl<M: SoilModel> ModelPoint<M> {
     }
 }
 
-impl<M: SoilModel> Point for ModelPoint<M> {
+impl<M: SoilModel + 'static> Point for ModelPoint<M> {
     fn mark(&mut self) {
         self.marked = self.state;
     }
@@ -75,5 +78,9 @@ impl<M: SoilModel> Point for ModelPoint<M> {
             }
             None => false,
         }
+    }
+
+    fn copy(&self) -> Box<dyn Point> {
+        Box::new(self.clone())
     }
 }
