@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from . import _cli_lab
 from ._errors import InvalidInput, RunInterrupted, SandboilError
 from .motion import Kind, Motion
 from .plan import plan as plan_of
@@ -29,6 +30,7 @@ app = typer.Typer(
 )
 motion_app = typer.Typer(help="Look at ground motions and convert them.", no_args_is_help=True)
 app.add_typer(motion_app, name="motion")
+app.add_typer(_cli_lab.app, name="lab")
 
 SceneFile = Annotated[Path, typer.Argument(help="Scene as a TOML file.", metavar="SCENE")]
 MotionOption = Annotated[

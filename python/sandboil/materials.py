@@ -466,3 +466,14 @@ Material = Annotated[
     PM4Sand | Elastic | PressureElastic | DruckerPrager | MohrCoulomb | TotalStress,
     Field(discriminator="kind"),
 ]
+
+
+def material(table: dict[str, Any]) -> Material:
+    """The soil that a table of `kind` and parameters says; :class:`InvalidInput` if it says none."""
+    return _Soil(**{"material": table}).material
+
+
+class _Soil(Model):
+    _label: ClassVar[str] = "soil"
+
+    material: Material

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import inspect
 import itertools
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,7 @@ import tomli_w
 from pydantic import BeforeValidator, Field, StrictBool, ValidationInfo, field_validator, model_validator
 from shapely.geometry.base import BaseGeometry
 
-from . import _core
+from . import _core, _toml
 from ._errors import InvalidInput, nearest_name
 from ._model import Many, Model, Number
 from .materials import Elastic, Material, NonNegative, PM4Sand, Positive
@@ -952,21 +951,11 @@ class Scene(Model):
         if isinstance(path_or_text, str) and "\n" in path_or_text:
             return cls._from_text(path_or_text, "text", Path())
         path = Path(path_or_text)
-        try:
-            # A byte order mark, as some editors write it, is no part of the text.
-            text = path.read_text(encoding="utf-8-sig")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-            raise InvalidInput("scene", str(path), f"must be a readable TOML file: {reason}") from error
-        return cls._from_text(text, str(path), path.parent)
+        return cls._from_text(_toml.read(path, "scene"), str(path), path.parent)
 
     @classmethod
     def _from_text(cls, text: str, origin: str, folder: Path) -> Scene:
-        try:
-            said = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise InvalidInput("scene", origin, f"must be TOML: {error}") from error
-        scene = cls(**said)
+        scene = cls(**_toml.parse(text, "scene", origin))
         stages = tuple(_anchored(stage, folder) for stage in scene.stages)
         return scene.model_copy(update={"stages": stages})
 

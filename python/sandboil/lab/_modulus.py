@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import StrictBool
 
 from ._arguments import (
     Amplitudes,
@@ -36,7 +37,7 @@ def modulus_reduction(
     K0: EarthPressure = 0.5,
     strains: Amplitudes = _AMPLITUDES,
     cycles: Count = 3,
-    drained: bool = True,
+    drained: StrictBool = True,
     void_ratio: VoidRatio = None,
     integrator: Integrator = "default",
     tolerance: Tolerance = None,

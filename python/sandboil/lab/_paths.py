@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import StrictBool
 
 from .. import _core
 from ..discretise import Floats
@@ -81,7 +82,7 @@ def plane_strain_compression(
     sigma_v0: Pressure = 101.3,
     K0: EarthPressure = 1.0,
     void_ratio: VoidRatio = None,
-    drained: bool = False,
+    drained: StrictBool = False,
     axial_strain_max: AxialStrain = 0.10,
     integrator: Integrator = "default",
     tolerance: Tolerance = None,
@@ -120,7 +121,7 @@ def plane_strain_compression(
 
 
 @checked
-def reconsolidation(test: Tested, *, post_shaking: bool = True) -> Reconsolidation:
+def reconsolidation(test: Tested, *, post_shaking: StrictBool = True) -> Reconsolidation:
     """Go on with the specimen of an undrained shear test: let its pore pressure dissipate.
 
     First the shear stress goes back, undrained, to what it was before the test; it is held from there on.

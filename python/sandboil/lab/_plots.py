@@ -68,9 +68,9 @@ def _drawn(
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(1.0 + 3.8 * columns, 0.6 + 2.9 * rows), layout="constrained")
         for axes, names in zip(figure.subplots(rows, columns).flat, panels, strict=True):
+            _draw(axes, test, names, {"color": OURS, "label": "sandboil"})
             if reference is not None:
-                _draw(axes, reference, names, {"color": REFERENCE, "label": "reference"})
-            _draw(axes, test, names, {"color": OURS, "lw": 0.8, "label": "sandboil"})
+                _draw(axes, reference, names, {"color": REFERENCE, "ls": "--", "label": "reference"})
             (x, y) = names
             axes.set(xlabel=_QUANTITIES[x][0], ylabel=_QUANTITIES[y][0])
             if x in ("sigma_v_eff", "cycle"):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import StrictBool
 
 from .. import _core
 from .._errors import InvalidInput
@@ -46,7 +47,7 @@ def cyclic_dss(
     void_ratio: VoidRatio = None,
     gamma_stop: Limit = 0.05,
     max_cycles: Count = 60,
-    drained: bool = False,
+    drained: StrictBool = False,
     reversals: Series | None = None,
     gamma_reversals: Series | None = None,
     integrator: Integrator = "default",
@@ -137,7 +138,7 @@ def monotonic_dss(
     K0: EarthPressure = 0.5,
     static_shear_ratio: Bias = 0.0,
     void_ratio: VoidRatio = None,
-    drained: bool = False,
+    drained: StrictBool = False,
     gamma_max: Limit = 0.10,
     integrator: Integrator = "default",
     tolerance: Tolerance = None,

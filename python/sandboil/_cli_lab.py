@@ -1,0 +1,188 @@
+"""The commands `sandboil lab ...`: tests on one material point."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from . import _toml, lab
+from ._errors import InvalidInput, SandboilError
+from ._style import DPI
+from .discretise import Floats
+from .lab._arguments import Integrator
+from .materials import Material, PM4Sand, material
+
+app = typer.Typer(help="Test a soil at one point.", no_args_is_help=True)
+
+DrOption = Annotated[float | None, typer.Option("--Dr", help="PM4Sand: relative density, fraction.")]
+G0Option = Annotated[float | None, typer.Option("--G0", help="PM4Sand: shear modulus coefficient.")]
+HpoOption = Annotated[float | None, typer.Option("--hpo", help="PM4Sand: contraction rate.")]
+SoilOption = Annotated[
+    Path | None, typer.Option("--soil", help="TOML with kind and parameters, as a scene's material.")
+]
+SigmaOption = Annotated[float, typer.Option("--sigma-v0", help="Vertical effective stress, kPa.")]
+K0Option = Annotated[float, typer.Option("--K0", help="Horizontal over vertical effective stress.")]
+BiasOption = Annotated[float, typer.Option(help="Static shear stress over sigma_v0.")]
+VoidRatioOption = Annotated[float | None, typer.Option(help="At the start; default the soil's own.")]
+IntegratorOption = Annotated[Integrator, typer.Option(help="Of rate-type models.")]
+OutOption = Annotated[Path | None, typer.Option(help="CSV for the record.")]
+
+# Levels that the summary of a cyclic test counts cycles to.
+_LEVELS = (
+    *(("r_u", level) for level in (0.90, 0.95, 0.98)),
+    *((measure, level) for measure in ("gamma_sa", "gamma_da") for level in (0.01, 0.03, 0.05)),
+)
+# Shear strains at which the summary of a monotonic test reads stresses.
+_STRAINS = (0.001, 0.005, 0.01, 0.02, 0.05, 0.1)
+
+
+def soil_of(file: Path | None, **sand: float | None) -> Material:
+    """The soil of a TOML file, or PM4Sand by its three parameters."""
+    given = {name: value for name, value in sand.items() if value is not None}
+    if file is None:
+        return PM4Sand(**given)
+    if given:
+        raise InvalidInput("--soil", str(file), f"excludes --{', --'.join(given)}", "put them into the file")
+    return material(_toml.parse(_toml.read(file, "--soil"), "--soil", str(file)))
+
+
+@app.command()
+def dss(
+    Dr: DrOption = None,
+    G0: G0Option = None,
+    hpo: HpoOption = None,
+    soil: SoilOption = None,
+    csr: Annotated[float | None, typer.Option(help="Cyclic shear stress over sigma_v0.")] = None,
+    monotonic: Annotated[bool, typer.Option("--monotonic", help="Shear one way instead.")] = False,
+    drained: Annotated[bool, typer.Option("--drained", help="Hold the stress, not the volume.")] = False,
+    sigma_v0: SigmaOption = 101.3,
+    K0: K0Option = 0.5,
+    static_shear_ratio: BiasOption = 0.0,
+    void_ratio: VoidRatioOption = None,
+    gamma_stop: Annotated[float, typer.Option(help="Shear strain that ends a cyclic test.")] = 0.05,
+    max_cycles: Annotated[int, typer.Option(help="Cycles that end a cyclic test.")] = 60,
+    gamma_max: Annotated[float, typer.Option(help="Shear strain that ends a monotonic test.")] = 0.10,
+    integrator: IntegratorOption = "default",
+    out: OutOption = None,
+    plot: Annotated[Path | None, typer.Option(help="Picture, PNG, PDF or SVG.")] = None,
+) -> None:
+    """Direct simple shear, cyclic (--csr) or --monotonic; prints what one asks of such a test."""
+    common: dict[str, Any] = {
+        "sigma_v0": sigma_v0,
+        "K0": K0,
+        "static_shear_ratio": static_shear_ratio,
+        "void_ratio": void_ratio,
+        "drained": drained,
+        "integrator": integrator,
+    }
+    tested = soil_of(soil, Dr=Dr, G0=G0, hpo=hpo)
+    if monotonic == (csr is not None):
+        raise InvalidInput("--csr", csr, "must be given for a cyclic test, and not with --monotonic")
+    test: lab.ShearTest
+    if csr is None:
+        test = lab.monotonic_dss(tested, gamma_max=gamma_max, **common)
+        lines = _monotonic_lines(test)
+    else:
+        test = lab.cyclic_dss(tested, csr=csr, gamma_stop=gamma_stop, max_cycles=max_cycles, **common)
+        lines = _cyclic_lines(test)
+    typer.echo("\n".join([*lines, f"{'ended':<28}{test.ended}"]))
+    if out is not None:
+        _write(out, test.columns())
+    if plot is not None:
+        try:
+            test.plot().savefig(plot, dpi=DPI)
+        except (OSError, ValueError) as error:
+            raise InvalidInput("--plot", str(plot), f"must be a writable picture: {error}") from error
+    _stop_if_incomplete(test)
+
+
+def _cyclic_lines(test: lab.CyclicTest) -> list[str]:
+    names = {"r_u": "r_u", "gamma_sa": "single amplitude", "gamma_da": "double amplitude"}
+    lines = [f"{'criterion':<28}{'cycles':>8}"]
+    for measure, level in _LEVELS:
+        cycles = test.cycles_to(**{measure: level})
+        shown = f"{level:.2f}" if measure == "r_u" else f"{100.0 * level:g} %"
+        lines.append(f"{names[measure] + ' ' + shown:<28}{cycles:>8.2f}".replace("     nan", "   never"))
+    lines.append(f"{'cycles made':<28}{test.cycle[-1]:>8.2f}")
+    lines.append(f"{'largest r_u':<28}{test.r_u.max():>8.3f}")
+    lines.append(f"{'largest shear strain, %':<28}{100.0 * test.gamma_sa.max():>8.2f}")
+    return lines
+
+
+def _monotonic_lines(test: lab.ShearTest) -> list[str]:
+    lines = [f"{'shear strain, %':<18}{'shear stress, kPa':>20}{'vertical, kPa':>16}{'contraction, %':>16}"]
+    for strain in (each for each in _STRAINS if each <= test.gamma[-1]):
+        tau, sigma, volume = (
+            np.interp(strain, test.gamma, column) for column in (test.tau, test.sigma_v_eff, test.eps_v)
+        )
+        lines.append(f"{100.0 * strain:<18g}{tau:>20.2f}{sigma:>16.2f}{100.0 * volume:>16.3f}")
+    lines.append(f"{'largest':<18}{test.tau.max():>20.2f}")
+    return lines
+
+
+@app.command("strain-path")
+def strain_path(
+    file: Annotated[
+        Path, typer.Argument(help="CSV with the columns eps_xx, eps_yy and gamma_xy.", metavar="PATH")
+    ],
+    stress0: Annotated[
+        tuple[float, float, float],
+        typer.Option(help="First effective stress xx yy xy, kPa, tension positive.", metavar="XX YY XY"),
+    ],
+    Dr: DrOption = None,
+    G0: G0Option = None,
+    hpo: HpoOption = None,
+    soil: SoilOption = None,
+    void_ratio: VoidRatioOption = None,
+    integrator: IntegratorOption = "default",
+    out: OutOption = None,
+) -> None:
+    """Lead a soil through strains, tension positive; prints or writes the stresses as CSV."""
+    test = lab.strain_path(
+        soil_of(soil, Dr=Dr, G0=G0, hpo=hpo),
+        stress0=stress0,
+        strain=_strains(file),
+        void_ratio=void_ratio,
+        integrator=integrator,
+    )
+    if out is None:
+        typer.echo(_csv(test.columns()), nl=False)
+    else:
+        _write(out, test.columns())
+    _stop_if_incomplete(test)
+
+
+def _strains(path: Path) -> Floats:
+    names = ("eps_xx", "eps_yy", "gamma_xy")
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = list(csv.DictReader(file))
+        return np.array([[float(row[name]) for name in names] for row in rows])
+    except KeyError as error:
+        raise InvalidInput("PATH", str(path), f"must have a column {error.args[0]}") from error
+    except (OSError, ValueError, TypeError) as error:
+        raise InvalidInput("PATH", str(path), f"must be a CSV of numbers below a header: {error}") from error
+
+
+def _csv(columns: dict[str, NDArray[Any]]) -> str:
+    # Adding 0 takes the sign of a zero away.
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(f"{value + 0.0:.9g}" for value in row) for row in rows)]
+    return "\n".join(lines) + "\n"
+
+
+def _write(path: Path, columns: dict[str, NDArray[Any]]) -> None:
+    try:
+        path.write_text(_csv(columns), encoding="utf-8")
+    except OSError as error:
+        raise InvalidInput("--out", str(path), f"must be writable: {error.strerror}") from error
+
+
+def _stop_if_incomplete(test: lab.ShearTest | lab.PathTest) -> None:
+    if not test.complete:
+        raise SandboilError(f"the test stopped: {test.ended}")
