@@ -470,7 +470,8 @@ Material = Annotated[
 
 def material(table: dict[str, Any]) -> Material:
     """The soil that a table of `kind` and parameters says; :class:`InvalidInput` if it says none."""
-    return _Soil(**{"material": table}).material
+    given: dict[str, Any] = {"material": table}
+    return _Soil(**given).material
 
 
 class _Soil(Model):
