@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scenes
-from sandboil import Gravity, Motion, Run, Shaking, load
+from sandboil import Gravity, Motion, PM4Sand, Run, Shaking, lab, load
 from sandboil.cli import main
 
 DONE, INVALID, STOPPED, INTERRUPTED = 0, 2, 3, 130
@@ -103,8 +103,8 @@ def test_another_motion_shakes_the_scene(scene_file: Path, record: Path, tmp_pat
 
 def test_only_commands_that_work_are_offered() -> None:
     told = called("--help").stdout
-    assert all(name in told for name in ("plan", "run", "plot", "motion"))
-    assert not any(name in told for name in ("lab", "report", "trade", "study"))
+    assert all(name in told for name in ("plan", "run", "plot", "motion", "lab"))
+    assert not any(name in told for name in ("report", "trade", "study"))
     assert "--resume" not in called("run", "--help").stdout
 
 
@@ -201,6 +201,76 @@ def test_interrupting_exits_with_130_and_leaves_a_readable_file(tmp_path: Path) 
     assert results.status == "interrupted"
     assert np.isfinite(results.field_series("velocity")).all()
     assert called("plot", out).returncode == DONE
+
+
+# The laboratory
+
+SAND = ("--Dr", 0.55, "--G0", 677, "--hpo", 0.4)
+
+
+def test_cyclic_shear_counts_cycles(tmp_path: Path) -> None:
+    out, picture = tmp_path / "test.csv", tmp_path / "test.png"
+    told = called("lab", "dss", *SAND, "--csr", 0.147, "--out", out, "--plot", picture)
+    assert (told.returncode, told.stderr) == (DONE, "")
+    expected = lab.cyclic_dss(PM4Sand(Dr=0.55, G0=677, hpo=0.4), csr=0.147)
+    assert f"{'single amplitude 3 %':<28}{expected.cycles_to(gamma_sa=0.03):>8.2f}\n" in told.stdout
+    assert f"{'double amplitude 5 %':<28}{expected.cycles_to(gamma_da=0.05):>8.2f}\n" in told.stdout
+    assert told.stdout.splitlines()[-1].endswith(expected.ended)
+    header, *rows = out.read_text().splitlines()
+    assert header.split(",") == list(expected.columns())
+    assert len(rows) == len(expected.gamma)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_criterion_that_is_never_reached_says_so() -> None:
+    told = called("lab", "dss", *SAND, "--csr", 0.05, "--max-cycles", 2)
+    assert told.returncode == DONE
+    assert f"{'r_u 0.95':<28}{'never':>8}\n" in told.stdout
+
+
+def test_monotonic_shear_of_a_soil_in_a_file(tmp_path: Path) -> None:
+    soil = tmp_path / "soil.toml"
+    soil.write_text('kind = "elastic"\nG = 3.0e4\nK = 9.0e4\n')
+    told = called("lab", "dss", "--soil", soil, "--monotonic", "--drained", "--gamma-max", 0.01)
+    assert told.returncode == DONE
+    assert [line.split()[:2] for line in told.stdout.splitlines()[1:4]] == [
+        ["0.1", "30.00"],
+        ["0.5", "150.00"],
+        ["1", "300.00"],
+    ]
+
+
+def test_a_strain_path_gives_stresses_as_csv(tmp_path: Path) -> None:
+    path, out = tmp_path / "path.csv", tmp_path / "stress.csv"
+    path.write_text("gamma_xy,eps_xx,eps_yy\n0,0,0\n0.001,0,-0.0001\n")
+    arguments = ("lab", "strain-path", path, "--stress0", -50, -100, 0, *SAND)
+    told = called(*arguments)
+    assert told.returncode == DONE
+    header, first, last = told.stdout.splitlines()
+    assert header == "eps_xx,eps_yy,gamma_xy,sig_xx,sig_yy,tau_xy,sig_zz,void_ratio"
+    assert first == "0,0,0,-50,-100,0,-50,0.635"
+    assert [float(value) for value in last.split(",")][:3] == [0.0, -1e-4, 1e-3]
+    assert called(*arguments, "--out", out).stdout == ""
+    assert out.read_text() == told.stdout
+
+
+def test_slips_in_the_laboratory_are_refused(tmp_path: Path) -> None:
+    soil, path = tmp_path / "soil.toml", tmp_path / "path.csv"
+    assert "material.hpo = None: is required" in refused("lab", "dss", "--Dr", 0.5, "--G0", 600, "--csr", 0.1)
+    assert "lab.cyclic_dss.K0" in refused("lab", "dss", *SAND, "--csr", 0.1, "--K0", 0.01)
+    assert "must be given for a cyclic test" in refused("lab", "dss", *SAND)
+    assert "and not with --monotonic" in refused("lab", "dss", *SAND, "--csr", 0.1, "--monotonic")
+    assert "must be a readable TOML file" in refused("lab", "dss", "--soil", soil, "--csr", 0.1)
+    soil.write_text("kind = 'pm4sand'\nDr = 0.5\nG0 = 600\nhp = 0.4\n")
+    assert "soil.material.hp = 0.4: unknown key" in refused("lab", "dss", "--soil", soil, "--csr", 0.1)
+    assert "excludes --Dr, --G0, --hpo" in refused("lab", "dss", "--soil", soil, *SAND, "--csr", 0.1)
+    out = tmp_path / "none" / "out.csv"
+    done = called("lab", "dss", *SAND, "--csr", 0.3, "--out", out)
+    assert (done.returncode, "must be writable" in done.stderr) == (INVALID, True)
+    stress0 = ("--stress0", -50, -100, 0)
+    assert "must be a CSV" in refused("lab", "strain-path", path, *stress0, *SAND)
+    path.write_text("eps_xx,eps_yy\n0,0\n")
+    assert "must have a column gamma_xy" in refused("lab", "strain-path", path, *stress0, *SAND)
 
 
 # Motions

@@ -116,7 +116,9 @@ def _cyclic_lines(test: lab.CyclicTest) -> list[str]:
 
 def _monotonic_lines(test: lab.ShearTest) -> list[str]:
     lines = [f"{'shear strain, %':<18}{'shear stress, kPa':>20}{'vertical, kPa':>16}{'contraction, %':>16}"]
-    for strain in (each for each in _STRAINS if each <= test.gamma[-1]):
+    # The last increment leaves round-off.
+    reached = [strain for strain in _STRAINS if strain <= round(float(test.gamma[-1]), 9)]
+    for strain in reached:
         tau, sigma, volume = (
             np.interp(strain, test.gamma, column) for column in (test.tau, test.sigma_v_eff, test.eps_v)
         )

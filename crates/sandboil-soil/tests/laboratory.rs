@@ -78,3 +78,16 @@ fn a_stress_that_the_sand_cannot_carry_ends_the_path_there() {
     assert!(reached.xy > 10.0 && reached.xy < 90.0, "{reached:?}");
     assert_eq!(record.rows().len(), 3);
 }
+
+#[test]
+fn a_copy_goes_on_as_the_specimen_would_have_and_leaves_it() {
+    let mut specimen = specimen(&sand(CALIBRATIONS[1]));
+    specimen.shear(&cyclic(0.147, false, 3), &mut Record::new(Resolution::TURNS), &mut never);
+    let (before, mut copy) = (specimen.stress(), specimen.copy());
+    let more = cyclic(0.1, true, 4);
+    let mut records = [Record::new(Resolution::TURNS), Record::new(Resolution::TURNS)];
+    copy.shear(&more, &mut records[0], &mut never);
+    assert_eq!(specimen.stress(), before);
+    specimen.shear(&more, &mut records[1], &mut never);
+    assert_eq!(records[0].rows(), records[1].rows());
+}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -148,9 +148,8 @@ class CyclicTest(ShearTest):
 
     @property
     def gamma_sa(self) -> Floats:
-        """Single amplitude of the shear strain, |gamma - gamma at the start|, 1, shape (n,)."""
-        amplitude: Floats = np.abs(self.gamma - self.gamma[0])
-        return amplitude
+        """Single amplitude of the shear strain, |gamma|, 1, shape (n,)."""
+        return np.abs(self.gamma)
 
     @property
     def gamma_da(self) -> Floats:
@@ -168,12 +167,10 @@ class CyclicTest(ShearTest):
         return np.flatnonzero(np.diff(self.turns, prepend=0))
 
     def peaks(self) -> Self:
-        """The rows at the turns only."""
+        """The rows at the turns only, without the specimen."""
         at_turn = self._rows_of_turns()
-        kept = {each.name: getattr(self, each.name) for each in fields(self)}
-        return type(self)(
-            **{name: value[at_turn] if np.ndim(value) == 1 else value for name, value in kept.items()}
-        )
+        stored = self.columns().keys() & {each.name for each in fields(self)}
+        return replace(self, specimen=None, **{name: getattr(self, name)[at_turn] for name in stored})
 
     def plot(self, reference: object | None = None) -> Figure:
         """Stress path, stress-strain loops, and pore pressure and strain over cycles, as a matplotlib figure.

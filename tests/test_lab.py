@@ -1,0 +1,376 @@
+"""The laboratory: conventions, counts, and the tests against what elasticity and the definitions say."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import sandboil as sb
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from matplotlib.figure import Figure
+from sandboil import InvalidInput, lab
+
+SAND = sb.PM4Sand(Dr=0.55, G0=677.0, hpo=0.40)
+ROCK = sb.Elastic(G=3.0e4, K=9.0e4)
+SIGMA = 101.3
+INTEGRATORS = ("default", "rk4", "reference")
+
+
+class Hooke:
+    """ROCK as a user would write it."""
+
+    def initialise(self, stress: tuple[float, ...], void_ratio: float | None) -> tuple[float, ...]:
+        return stress
+
+    def update(
+        self, state: tuple[float, float, float, float], strain: tuple[float, float, float]
+    ) -> tuple[float, ...]:
+        (xx, yy, xy, zz), (exx, eyy, gxy) = state, strain
+        p, g = (9.0e4 - 2.0e4) * (exx + eyy), 3.0e4
+        return xx + p + 2.0 * g * exx, yy + p + 2.0 * g * eyy, xy + g * gxy, zz + p
+
+    def stress(self, state: Any) -> Any:
+        return state
+
+    def moduli(self, state: Any) -> tuple[float, float]:
+        return 3.0e4, 9.0e4
+
+
+@pytest.fixture(scope="module")
+def cyclic() -> lab.CyclicTest:
+    return lab.cyclic_dss(SAND, csr=0.147)
+
+
+# Cyclic direct simple shear
+
+
+def test_it_begins_where_it_is_told_to() -> None:
+    test = lab.cyclic_dss(SAND, sigma_v0=80.0, K0=0.6, csr=0.1, static_shear_ratio=0.05, max_cycles=1)
+    first = {name: column[0] for name, column in test.columns().items()}
+    assert first == pytest.approx(
+        {
+            "gamma": 0.0,
+            "tau": 4.0,
+            "sigma_v_eff": 80.0,
+            "sigma_h_eff": 48.0,
+            "r_u": 0.0,
+            "eps_v": 0.0,
+            "cycle": 0.0,
+            "turns": 0,
+            "void_ratio": SAND.initial_void_ratio,
+        },
+        abs=1e-12,
+    )
+
+
+def test_uniform_shear_turns_about_the_static_stress() -> None:
+    test = lab.cyclic_dss(SAND, csr=0.1, static_shear_ratio=0.04, max_cycles=3)
+    assert (test.complete, test.ended) == (True, "max_cycles = 3 were done")
+    peaks = test.peaks()
+    np.testing.assert_allclose(peaks.tau / SIGMA, [0.14, -0.06] * 3, rtol=1e-6)
+    np.testing.assert_allclose(peaks.cycle, np.arange(0.25, 3.0, 0.5))
+    np.testing.assert_array_equal(peaks.turns, np.arange(1, 7))
+
+
+def test_undrained_shear_holds_the_volume_and_drained_shear_the_stress() -> None:
+    undrained = lab.cyclic_dss(SAND, csr=0.1, max_cycles=3)
+    drained = lab.cyclic_dss(SAND, csr=0.1, max_cycles=3, drained=True)
+    assert not undrained.eps_v.any()
+    assert undrained.r_u[-1] > 0.1
+    np.testing.assert_allclose(drained.sigma_v_eff, SIGMA, rtol=1e-5)
+    assert drained.eps_v[-1] > 1e-5
+    change = drained.void_ratio[0] - drained.void_ratio
+    np.testing.assert_allclose(change, (1.0 + drained.void_ratio[0]) * drained.eps_v, rtol=1e-6, atol=1e-12)
+
+
+def test_irregular_shear_turns_where_it_is_told_to() -> None:
+    turning = [0.05, -0.07, 0.13, 0.1, 0.12]
+    test = lab.cyclic_dss(SAND, reversals=turning)
+    np.testing.assert_allclose(test.peaks().tau, SIGMA * np.array(turning), rtol=1e-6)
+    assert test.ended == "all reversals were made"
+
+
+@pytest.mark.parametrize("drained", [True, False])
+def test_strain_turns_where_it_is_told_to(drained: bool) -> None:
+    test = lab.cyclic_dss(SAND, gamma_reversals=np.array([0.002, -0.002, 0.004]), drained=drained)
+    np.testing.assert_allclose(test.peaks().gamma, [0.002, -0.002, 0.004], rtol=1e-12)
+
+
+def test_shear_ends_at_its_strain_limit(cyclic: lab.CyclicTest) -> None:
+    assert cyclic.complete
+    assert cyclic.ended == "the shear strain reached gamma_stop = 0.05"
+    assert np.abs(cyclic.gamma).max() == pytest.approx(0.05, abs=2e-5)
+
+
+def test_a_strength_that_is_short_of_the_stress_is_told() -> None:
+    """Below the bounding stress ratio, so not refused, and yet more than drained sand carries."""
+    test = lab.cyclic_dss(SAND, csr=0.7, drained=True)
+    assert test.ended == "the shear strain reached gamma_stop = 0.05 before the first turn"
+    assert math.isnan(test.cycles_to(gamma_da=0.01))
+
+
+def test_denser_sand_takes_more_cycles() -> None:
+    cycles = [
+        lab.cyclic_dss(SAND, csr=0.147, void_ratio=e).cycles_to(gamma_sa=0.03) for e in (0.66, 0.635, 0.61)
+    ]
+    assert cycles[0] < cycles[1] < cycles[2]
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_every_integrator_counts_the_same(integrator: Any, cyclic: lab.CyclicTest) -> None:
+    other = lab.cyclic_dss(SAND, csr=0.147, integrator=integrator)
+    assert other.cycles_to(r_u=0.95) == pytest.approx(cyclic.cycles_to(r_u=0.95), abs=0.03)
+
+
+def test_a_coarse_tolerance_is_allowed_and_near(cyclic: lab.CyclicTest) -> None:
+    coarse = lab.cyclic_dss(SAND, csr=0.147, tolerance=1.0e-4)
+    assert coarse.cycles_to(gamma_sa=0.03) == pytest.approx(cyclic.cycles_to(gamma_sa=0.03), abs=0.03)
+
+
+# Counts of cycles
+
+
+def by_hand(turns: list[float], r_u: list[float]) -> lab.CyclicTest:
+    """A test whose strain goes straight from turn to turn, five rows each, r_u per turn."""
+    gamma, cycle, made = [0.0], [0.0], [0]
+    for k, turn in enumerate(turns):
+        begin = gamma[-1]
+        gamma += [begin + share * (turn - begin) for share in (0.2, 0.4, 0.6, 0.8, 1.0)]
+        span = 0.25 if k == 0 else 0.5
+        cycle += [cycle[-1] + share * span for share in (0.2, 0.4, 0.6, 0.8, 1.0)]
+        made += [k, k, k, k, k + 1]
+    pressure = np.interp(cycle, [0.0, *(0.25 + 0.5 * k for k in range(len(turns)))], [0.0, *r_u])
+    nothing = np.zeros(len(gamma))
+    return lab.CyclicTest(
+        gamma=np.array(gamma),
+        tau=nothing,
+        sigma_v_eff=100.0 * (1.0 - pressure),
+        sigma_h_eff=nothing,
+        eps_v=nothing,
+        void_ratio=nothing,
+        sigma_v0=100.0,
+        cycle=np.array(cycle),
+        turns=np.array(made),
+        complete=True,
+        ended="",
+    )
+
+
+def test_cycles_are_counted_as_they_are_defined() -> None:
+    test = by_hand([0.01, -0.02, 0.04], [0.2, 0.6, 0.9])
+    assert test.cycles_to(r_u=0.4) == pytest.approx(0.5)
+    assert test.cycles_to(gamma_sa=0.01) == pytest.approx(0.25)
+    # From 0.01 to -0.02 the distance from the start is 0.015 at five sixths of the stroke.
+    assert test.cycles_to(gamma_sa=0.015) == pytest.approx(0.25 + 0.5 * 5.0 / 6.0)
+    # The double amplitude counts from turn to turn: the first has none before it.
+    assert test.cycles_to(gamma_da=0.005) == pytest.approx(0.25 + 0.5 / 6.0)
+    assert test.cycles_to(gamma_da=0.03) == pytest.approx(0.75)
+    assert test.cycles_to(gamma_da=0.06) == pytest.approx(1.25)
+    assert math.isnan(test.cycles_to(gamma_da=0.0601))
+    assert math.isnan(test.cycles_to(r_u=0.95))
+    np.testing.assert_allclose(test.peaks().gamma_sa, [0.01, 0.02, 0.04])
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    st.lists(st.floats(0.001, 0.1), min_size=1, max_size=8),
+    st.floats(0.001, 0.1),
+    st.floats(0.001, 0.1),
+)
+def test_a_higher_level_is_never_reached_earlier(amplitudes: list[float], one: float, two: float) -> None:
+    turns = [amplitude * (-1.0) ** k for k, amplitude in enumerate(amplitudes)]
+    test = by_hand(turns, [0.1 * (k + 1) for k in range(len(turns))])
+    low, high = sorted((one, two))
+    for measure in ("gamma_sa", "gamma_da", "r_u"):
+        first, second = (test.cycles_to(**{measure: level}) for level in (low, high))
+        assert math.isnan(second) or first <= second
+        assert math.isnan(first) or 0.0 <= first <= test.cycle[-1]
+
+
+def test_a_count_of_nothing_or_of_two_things_is_refused(cyclic: lab.CyclicTest) -> None:
+    for asked in ({}, {"r_u": 0.9, "gamma_sa": 0.03}):
+        with pytest.raises(InvalidInput, match="exactly one measure of r_u, gamma_sa, gamma_da"):
+            cyclic.cycles_to(**asked)
+    with pytest.raises(InvalidInput, match=r"cycles_to\.r_u = -1\.0: must be greater than 0"):
+        cyclic.cycles_to(r_u=-1.0)
+
+
+# Other tests
+
+
+@pytest.mark.parametrize("drained", [True, False])
+def test_monotonic_shear_goes_to_its_strain(drained: bool) -> None:
+    test = lab.monotonic_dss(SAND, drained=drained, gamma_max=0.02)
+    assert test.complete
+    assert test.gamma[-1] == pytest.approx(0.02, rel=1e-12)
+    assert (np.diff(test.gamma) > 0.0).all()
+
+
+def test_a_strain_path_has_a_row_for_each_asked() -> None:
+    strain = np.array([[0.0, 0.0, 0.0], [1e-4, -2e-4, 3e-4], [0.0, -1e-4, -1e-4]])
+    test = lab.strain_path(ROCK, stress0=(-50.0, -100.0, 0.0), strain=strain)
+    assert (test.complete, test.ended) == (True, "the whole path was made")
+    lame, g = 9.0e4 - 2.0e4, 3.0e4
+    pressure = lame * (strain[:, 0] + strain[:, 1])
+    expected = np.column_stack(
+        [
+            -50.0 + pressure + 2.0 * g * strain[:, 0],
+            -100.0 + pressure + 2.0 * g * strain[:, 1],
+            g * strain[:, 2],
+        ]
+    )
+    np.testing.assert_allclose(test.stress, expected, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(test.stress_zz, -50.0 + pressure, rtol=1e-9)
+    np.testing.assert_array_equal(test.strain, strain)
+    back = lab.stress_path(ROCK, stress0=(-50.0, -100.0, 0.0), stress=test.stress)
+    np.testing.assert_allclose(back.strain, strain, atol=1e-9)
+
+
+def test_a_stress_that_sand_does_not_carry_ends_the_path_incomplete() -> None:
+    test = lab.stress_path(SAND, stress0=(-50.0, -100.0, 0.0), stress=[(-50, -100, 20), (-50, -100, 90)])
+    assert not test.complete
+    assert test.ended.startswith("in leg 2 of 2: the soil does not carry")
+    assert len(test.stress) == 2
+    assert 20.0 < test.stress[-1, 2] < 90.0
+
+
+def test_plane_strain_compression_holds_what_it_says() -> None:
+    drained = lab.plane_strain_compression(SAND, drained=True)
+    undrained = lab.plane_strain_compression(SAND, axial_strain_max=0.05)
+    assert drained.complete
+    assert undrained.complete
+    np.testing.assert_allclose(drained.sigma_h_eff, SIGMA, rtol=1e-5)
+    np.testing.assert_allclose(undrained.eps_v, 0.0, atol=1e-12)
+    assert drained.axial_strain[-1] == pytest.approx(0.1)
+    # Medium sand contracts, then dilates, and passes a peak.
+    assert drained.eps_v.max() > 0.0 > drained.eps_v[-1]
+    assert drained.q.max() > drained.q[-1] > 2.0 * SIGMA
+    np.testing.assert_allclose(undrained.excess_pore_pressure, SIGMA - undrained.sigma_h_eff, rtol=1e-12)
+
+
+def test_liquefied_sand_settles_more_with_its_post_shaking_stiffness(cyclic: lab.CyclicTest) -> None:
+    """About 1 % at D_r 0.55 after 5 % of strain; without the factor a fraction of that."""
+    before = cyclic.specimen
+    assert before is not None
+    stress = before.stress
+    soft = lab.reconsolidation(cyclic)
+    stiff = lab.reconsolidation(cyclic, post_shaking=False)
+    assert before.stress == stress, "the test's own specimen stays"
+    for test in (soft, stiff):
+        assert test.complete
+        assert test.sigma_v_eff[-1] == pytest.approx(SIGMA, rel=1e-6)
+        assert test.sigma_v_eff[0] < 0.05 * SIGMA
+        np.testing.assert_allclose(test.tau, 0.0, atol=1e-4)
+    assert 0.005 < soft.eps_v[-1] < 0.02
+    assert stiff.eps_v[-1] < 0.5 * soft.eps_v[-1]
+
+
+def test_reconsolidation_keeps_a_static_shear_stress() -> None:
+    test = lab.cyclic_dss(SAND, csr=0.12, static_shear_ratio=0.05)
+    settled = lab.reconsolidation(test)
+    np.testing.assert_allclose(settled.tau, 0.05 * SIGMA, rtol=1e-4)
+
+
+def test_elastic_soil_neither_softens_nor_damps() -> None:
+    test = lab.modulus_reduction(ROCK, strains=[1e-6, 1e-4, 1e-2])
+    assert test.complete
+    np.testing.assert_allclose(test.G, 3.0e4, rtol=1e-9)
+    np.testing.assert_allclose(test.G_ratio, 1.0, rtol=1e-9)
+    np.testing.assert_allclose(test.damping, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_sand_softens_and_damps(integrator: Any) -> None:
+    test = lab.modulus_reduction(SAND, integrator=integrator)
+    assert test.complete
+    assert test.G_ratio[0] == pytest.approx(1.0, abs=1e-3)
+    assert (np.diff(test.G) < 0.0).all()
+    assert test.damping[0] == pytest.approx(0.0, abs=1e-6)
+    assert (np.diff(test.damping) > -1e-6).all()
+
+
+# Models of one's own
+
+
+def test_a_model_in_python_is_tested_as_ours() -> None:
+    for test in (lab.cyclic_dss, lab.monotonic_dss):
+        for drained in (False, True):
+            extra = {"csr": 0.2, "max_cycles": 3} if test is lab.cyclic_dss else {"gamma_max": 0.01}
+            ours, theirs = (
+                test(soil, K0=0.6, drained=drained, **extra).columns() for soil in (ROCK, Hooke())
+            )
+            for name in ours:
+                np.testing.assert_allclose(theirs[name], ours[name], rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+def test_an_exception_of_a_model_reaches_its_author() -> None:
+    class Broken(Hooke):
+        def update(self, state: Any, strain: Any) -> Any:
+            raise ZeroDivisionError("division by my zero")
+
+    with pytest.raises(ZeroDivisionError, match="my zero"):
+        lab.monotonic_dss(Broken())
+
+
+def test_a_model_that_gives_nonsense_is_told() -> None:
+    class Nonsense(Hooke):
+        def moduli(self, state: Any) -> tuple[float, float]:
+            return math.nan, 1.0
+
+    with pytest.raises(ValueError, match="must be finite"):
+        lab.monotonic_dss(Nonsense())
+
+
+# Tables and pictures
+
+
+def test_a_test_is_a_dataframe(cyclic: lab.CyclicTest) -> None:
+    frame = cyclic.to_dataframe()
+    assert set(frame.columns) == {
+        *("gamma", "tau", "sigma_v_eff", "sigma_h_eff", "eps_v", "void_ratio", "cycle", "turns", "r_u")
+    }
+    np.testing.assert_array_equal(frame["r_u"], cyclic.r_u)
+    path = lab.strain_path(ROCK, stress0=(-50.0, -100.0, 0.0), strain=[(0, 0, 1e-4)]).to_dataframe()
+    assert list(path.columns) == [
+        *("eps_xx", "eps_yy", "gamma_xy", "sig_xx", "sig_yy", "tau_xy", "sig_zz", "void_ratio")
+    ]
+    assert "q" in lab.plane_strain_compression(ROCK, axial_strain_max=1e-4).to_dataframe()
+    assert "G_ratio" in lab.modulus_reduction(ROCK, strains=[1e-4]).to_dataframe()
+
+
+def test_without_pandas_it_says_how_to_get_it(
+    cyclic: lab.CyclicTest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
+    with pytest.raises(ImportError, match=r"pip install 'sandboil\[studies\]'"):
+        cyclic.to_dataframe()
+
+
+def labelled(figure: Figure) -> list[tuple[str, str]]:
+    figure.canvas.draw()
+    return [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
+
+
+def test_pictures_show_the_test_and_what_it_is_compared_with(cyclic: lab.CyclicTest) -> None:
+    other = lab.cyclic_dss(SAND, csr=0.16)
+    for reference in (other, other.columns()):
+        figure = cyclic.plot(reference=reference)
+        assert [y for _, y in labelled(figure)] == [
+            *("shear stress, kPa", "shear stress, kPa", "excess pore pressure ratio, 1", "shear strain, %")
+        ]
+        ours, theirs = figure.axes[0].get_lines()
+        np.testing.assert_array_equal(ours.get_xdata(), cyclic.sigma_v_eff)
+        np.testing.assert_array_equal(theirs.get_xdata(), other.sigma_v_eff)
+    drained = lab.cyclic_dss(SAND, csr=0.1, max_cycles=2, drained=True)
+    assert labelled(drained.plot())[2] == ("cycles, 1", "contraction, %")
+    assert len(labelled(lab.monotonic_dss(SAND, gamma_max=0.01).plot())) == 3
+    curve = lab.modulus_reduction(SAND, strains=[1e-5, 1e-4])
+    assert [y for _, y in labelled(curve.plot(reference=curve))] == ["$G/G_{max}$, 1", "damping ratio, %"]
+
+
+def test_a_reference_without_a_column_is_refused(cyclic: lab.CyclicTest) -> None:
+    with pytest.raises(InvalidInput, match="must have sigma_v_eff, an array"):
+        cyclic.plot(reference={"gamma": [0.0]})
