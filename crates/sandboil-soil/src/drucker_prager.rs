@@ -286,6 +286,51 @@ mod tests {
         }
     }
 
+    /// On the cone, in the corner and at the apex, before, through and after softening, also where it is brittle:
+    /// `q` falls by `G` and I1 by at least `9 K b` for each unit of plastic shear strain.
+    #[test]
+    fn plastic_shear_balances_the_stress() {
+        let (shear, bulk) = (9.1e4, 2.7e5);
+        let residual = Strength { c: 2.0, phi: 20.0, psi: 0.0 };
+        let parameters = Parameters {
+            peak: Strength { c: 14.4, phi: 31.0, psi: 10.0 },
+            softening: Some(Softening { residual, strain: 0.01 }),
+            tension_cutoff: Some(8.0),
+            matching: Matching::General,
+        };
+        let soil = DruckerPrager::new(Elastic::new(shear, bulk).unwrap(), parameters).unwrap();
+        let (mut cones, mut corners, mut apices) = (0, 0, 0);
+        for before in [0.0, 3e-3, 9.9e-3, 0.02] {
+            for mean in [-1e5, -1000.0, -50.0, 0.0, 7.0, 9.0, 30.0, 1000.0] {
+                for excess in [1e-6, 0.1, 5.0, 100.0, 3000.0] {
+                    let now = soil.cone(before);
+                    let size = now.size_at(3.0 * mean).max(0.0) + excess;
+                    let trial = Stress { xx: mean, yy: mean, xy: size, zz: mean };
+                    let fall = 9.0 * bulk * now.dilation;
+                    let State { stress, plastic_shear } = soil.returned(trial, before, fall);
+                    let plastic = plastic_shear - before;
+                    let (left, volume) = (stress.root_j2(), stress.first_invariant());
+                    let context = format!("{before} {mean} {excess}: {stress:?} {plastic}");
+                    assert!(
+                        (size - left - shear * plastic).abs() <= 1e-11 * (size + mean.abs()),
+                        "{context}"
+                    );
+                    let slack = 3.0 * mean - volume - fall * plastic;
+                    assert!(slack >= -1e-11 * (size + mean.abs()), "{context}");
+                    if left <= 1e-9 * size {
+                        apices += 1;
+                    } else if volume >= 24.0 - 1e-9 {
+                        corners += 1;
+                    } else {
+                        assert!(slack <= 1e-11 * (size + mean.abs()), "{context}");
+                        cones += 1;
+                    }
+                }
+            }
+        }
+        assert!(cones > 30 && corners > 5 && apices > 5, "{cones} {corners} {apices}");
+    }
+
     #[test]
     fn the_apex_is_that_of_mohr_and_coulomb() {
         for matching in [Matching::Usual, Matching::General] {
