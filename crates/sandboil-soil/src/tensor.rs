@@ -89,13 +89,21 @@ pub struct StrainIncrement {
 const MAX_STRAIN_INCREMENT: f64 = 10.0;
 
 impl StrainIncrement {
-    /// Refuses an increment with a component that is not finite, or of more than 1000 %.
+    /// Refuses an increment with a component that is not finite, or a strain or spin of more than 1000 %.
     pub(crate) fn bounded(&self) -> Result<(), SoilError> {
-        let largest = self.xx.abs().max(self.yy.abs()).max(self.xy.abs());
+        self.within(MAX_STRAIN_INCREMENT)
+    }
+
+    /// Refuses an increment with a component that is not finite, or a strain or spin beyond the lesser of 1000 % and
+    /// a limit.
+    pub(crate) fn within(&self, limit: f64) -> Result<(), SoilError> {
+        let limit = limit.min(MAX_STRAIN_INCREMENT);
         // A maximum passes over NaN, a sum does not.
-        finite("strain increment", self.xx + self.yy + self.xy + self.spin)?;
-        if largest > MAX_STRAIN_INCREMENT {
-            return Err(SoilError::StrainIncrementTooLarge { value: largest, limit: MAX_STRAIN_INCREMENT });
+        let sum = finite("strain increment", self.xx + self.yy + self.xy + self.spin)?;
+        let largest = self.xx.abs().max(self.yy.abs()).max(self.xy.abs()).max(self.spin.abs());
+        if !(largest <= limit) {
+            let value = if largest.is_finite() { largest } else { sum };
+            return Err(SoilError::StrainIncrementTooLarge { value, limit });
         }
         Ok(())
     }

@@ -86,7 +86,7 @@ impl PM4Sand {
             rotation: 0.0,
         };
         self.refresh_moduli(&mut state);
-        Ok(state)
+        state.finite()
     }
 
     /// `A_do` of the initial state (manual, section 3.5).

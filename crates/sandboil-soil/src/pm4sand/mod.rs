@@ -25,6 +25,9 @@ use crate::{
 };
 use state::Strain;
 
+/// Most parts of one increment, so that an integrator with tiny (or no) parts is refused instead of never ending.
+const MAX_PARTS: f64 = 1e7;
+
 impl SoilModel for PM4Sand {
     type State = State;
 
@@ -35,14 +38,14 @@ impl SoilModel for PM4Sand {
     /// Moves a state through a strain increment. On error the state is unchanged.
     ///
     /// Errors: [`SoilError::NonFinite`] for an increment or a result that is not finite,
-    /// [`SoilError::StrainIncrementTooLarge`] above 1000 %.
+    /// [`SoilError::StrainIncrementTooLarge`] above 1000 % or ten million parts of the integrator.
     fn update(
         &self,
         state: &mut State,
         de: &StrainIncrement,
         integrator: &Integrator,
     ) -> Result<UpdateReport, SoilError> {
-        de.bounded()?;
+        de.within(MAX_PARTS * integrator.max_increment())?;
         let mut next = *state;
         let mut strain = Strain {
             volume: -(de.xx + de.yy),
@@ -56,11 +59,7 @@ impl SoilModel for PM4Sand {
         }
         let mut report = UpdateReport::default();
         self.integrate(&mut next, strain, integrator, &mut report);
-        finite("stress", next.mean + next.deviator.half_difference + next.deviator.xy + next.out_of_plane)?;
-        finite("back-stress ratio", next.alpha.half_difference + next.alpha.xy)?;
-        finite("fabric", next.fabric.half_difference + next.fabric.xy + next.fabric_cumulative)?;
-        finite("shear modulus", next.moduli.shear)?;
-        *state = next;
+        *state = next.finite()?;
         Ok(report)
     }
 

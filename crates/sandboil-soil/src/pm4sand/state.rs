@@ -1,6 +1,6 @@
 //! What a stress point remembers.
 
-use crate::{Deviator, Moduli};
+use crate::{Deviator, Moduli, SoilError, error::finite};
 
 /// A strain (increment) in the model's convention: compression positive, material frame.
 #[derive(Debug, Clone, Copy)]
@@ -107,6 +107,21 @@ impl State {
     #[inline]
     pub(super) fn void_ratio_at(&self, volumetric_strain: f64) -> f64 {
         self.void_ratio_initial - (1.0 + self.void_ratio_initial) * volumetric_strain
+    }
+
+    /// The state, refused if anything that it tells is not a finite number.
+    pub(super) fn finite(self) -> Result<Self, SoilError> {
+        let size = |tensor: Deviator| tensor.half_difference.abs() + tensor.xy.abs();
+        let offset = self.offset;
+        let out_of_plane = self.out_of_plane + offset.out_of_plane;
+        // A sum of sizes bounds every component, whichever way the frame has turned.
+        let stress = (self.mean + offset.mean).abs() + size(self.deviator + offset.deviator);
+        finite("stress", stress + out_of_plane.abs())?;
+        finite("back-stress ratio", size(self.alpha))?;
+        finite("fabric", size(self.fabric) + self.fabric_cumulative)?;
+        finite("void ratio", self.void_ratio_at(self.volumetric_strain))?;
+        finite("bulk modulus", self.moduli.bulk)?;
+        Ok(self)
     }
 
     /// Whether the initial stress was inadmissible and is made up for by a constant offset.
