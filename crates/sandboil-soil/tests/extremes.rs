@@ -1,8 +1,10 @@
-//! PM4Sand at the ends of its range. Verdict of every test here: stable and finite, the bound stated.
+//! PM4Sand at the ends of its range. Verdict of every test here: stable and finite, or refused, the bound stated
+//! (`docs/theory/pm4sand.md`, "Ends of the range").
 
 mod point;
 
-use point::{CALIBRATIONS, advance, anisotropic, consolidated, sand, shear};
+use point::{CALIBRATIONS, SIGMA_V0, advance, anisotropic, consolidated, sand, shear};
+use sandboil_soil::laboratory::{Ending, Record, Resolution, Row, Shear, Specimen, Turn, Turns};
 use sandboil_soil::pm4sand::{PM4Sand, State};
 use sandboil_soil::{Integrator, SoilModel, StrainIncrement, Stress};
 
@@ -113,4 +115,128 @@ fn a_hundred_thousand_small_plastic_cycles_stay_bounded() {
         assert!(state.mean_stress() <= start && state.mean_stress() > 2.0 * state.minimum_pressure());
     }
     assert_admissible(&sand, &state, "small plastic cycles");
+}
+
+/// Undrained simple shear between stresses of `bias` less and more `csr`, over the vertical stress, from a stress.
+#[expect(clippy::unwrap_used, reason = "the stress is one that the sand takes")]
+fn undrained(
+    calibration: (f64, f64, f64),
+    (start, bias, csr, count): (Stress, f64, f64, usize),
+    integrator: Integrator,
+    strain_step: f64,
+) -> (Ending, Vec<Row>) {
+    let mut specimen = Specimen::new(&sand(calibration), start, None, integrator).unwrap();
+    let mut record = Record::new(Resolution::TURNS);
+    let turn = |ratio: f64| Turn::Stress(ratio * SIGMA_V0);
+    let turns = Turns::Alternating { odd: turn(bias + csr), even: turn(bias - csr), count };
+    let test = Shear { drained: false, turns, strain_step, strain_limit: 0.1 };
+    let ending = specimen.shear(&test, &mut record, &mut || false);
+    (ending, record.rows().to_vec())
+}
+
+fn mean_stress(stress: &Stress) -> f64 {
+    -0.5 * (stress.xx + stress.yy)
+}
+
+/// Steps and integrators under which a laboratory test must give one answer.
+fn variants() -> impl Iterator<Item = (Integrator, f64)> {
+    integrators().into_iter().flat_map(|integrator| [1e-5, 3e-6, 1e-6].map(|step| (integrator, step)))
+}
+
+/// Pressure lost in `cycles` of CSR 0.02 under every step and integrator, and the spread between these.
+fn slow_loss(calibration: (f64, f64, f64), cycles: usize) -> (f64, f64) {
+    let start = (anisotropic(), 0.0, 0.02, 2 * cycles);
+    let lost: Vec<f64> = variants()
+        .map(|(integrator, step)| {
+            let (ending, rows) = undrained(calibration, start, integrator, step);
+            assert_eq!(ending, Ending::Complete);
+            0.75 * SIGMA_V0 - mean_stress(&rows[rows.len() - 1].stress)
+        })
+        .collect();
+    let (least, most) = lost.iter().fold((f64::MAX, 0.0), |(low, high), x| (x.min(low), x.max(high)));
+    (most, most - least)
+}
+
+#[test]
+fn a_thousand_cycles_at_csr_of_a_fiftieth_lose_the_same_pressure_at_every_step() {
+    for (calibration, expected) in CALIBRATIONS.into_iter().zip([1.72, 0.24, 0.010]) {
+        let (lost, spread) = slow_loss(calibration, 1000);
+        assert!((lost / expected - 1.0).abs() < 0.05, "{lost} kPa");
+        assert!(spread < 0.005 * lost, "{spread} of {lost} kPa");
+    }
+}
+
+/// The number of cycles to 10 % shear strain under CSR 0.02, at the steps and integrators of [`variants`].
+#[test]
+#[ignore = "long: a hundred thousand cycles, several minutes"]
+fn a_hundred_thousand_cycles_at_csr_of_a_fiftieth() {
+    for calibration in CALIBRATIONS {
+        for (integrator, step) in variants() {
+            let start = (anisotropic(), 0.0, 0.02, 200_000);
+            let (ending, rows) = undrained(calibration, start, integrator, step);
+            let last = rows.last().unwrap();
+            let p = mean_stress(&last.stress);
+            println!(
+                "D_R {}, {integrator:?}, {step:e}: {ending:?}, cycle {:.0}, p {p:.2} kPa",
+                calibration.0, last.cycle
+            );
+            let expected = match calibration.0 {
+                0.35 => 10_564.0,
+                0.55 => 75_600.0,
+                _ => 99_999.75,
+            };
+            assert!((last.cycle / expected - 1.0).abs() < 2e-3, "{}", last.cycle);
+        }
+    }
+}
+
+/// Far above what resists liquefaction: the looser the sand the sooner it strains to the limit.
+#[test]
+fn csr_of_three_halves_strains_to_the_limit() {
+    for (calibration, cycles) in CALIBRATIONS.into_iter().zip([0.137, 2.729, 7.200]) {
+        for integrator in integrators() {
+            let start = (anisotropic(), 0.0, 1.5, 60);
+            let (ending, rows) = undrained(calibration, start, integrator, 1e-5);
+            assert_eq!(ending, Ending::StrainLimit);
+            let last = rows.last().unwrap();
+            assert!((last.cycle - cycles).abs() < 2e-3, "{} cycles", last.cycle);
+        }
+    }
+}
+
+/// Refused exactly where the stress ratio is outside both surfaces; stable where it is inside.
+#[test]
+fn earth_pressure_from_a_fifth_to_three_with_and_without_static_shear() {
+    for calibration in CALIBRATIONS {
+        let sand = sand(calibration);
+        let c = sand.parameters();
+        for k0 in [0.2, 0.3, 0.5, 1.0, 2.0, 3.0] {
+            for bias in [0.0, 0.35] {
+                let horizontal = -k0 * SIGMA_V0;
+                let start = Stress { xx: horizontal, yy: -SIGMA_V0, xy: bias * SIGMA_V0, zz: horizontal };
+                let p = mean_stress(&start);
+                let ratio = (start.xx - start.yy).hypot(2.0 * start.xy) / p;
+                let state_index = c.r / (c.q - (100.0 * p / c.p_atm).ln()) - c.dr;
+                let bounding = c.critical_ratio * (-c.nb * state_index).exp();
+                assert!(
+                    state_index < 0.0,
+                    "dense of critical, so that the bounding surface is the outer one"
+                );
+                let context = format!("D_R {}, K0 {k0}, bias {bias}: q/p {ratio} of {bounding}", c.dr);
+                assert_eq!(sand.carries(&start), ratio <= bounding, "{context}");
+                if sand.carries(&start) {
+                    for integrator in integrators() {
+                        let (ending, rows) =
+                            undrained(calibration, (start, bias, 0.15, 40), integrator, 1e-5);
+                        assert!(
+                            matches!(ending, Ending::Complete | Ending::StrainLimit),
+                            "{context}: {ending:?}"
+                        );
+                        let stress = rows.last().unwrap().stress;
+                        assert!(mean_stress(&stress) > 0.005 * c.p_atm, "{context}: {stress:?}");
+                    }
+                }
+            }
+        }
+    }
 }

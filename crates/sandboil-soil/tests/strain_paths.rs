@@ -2,8 +2,8 @@
 
 mod point;
 
-use point::{StrainPath, parts, sand};
-use sandboil_soil::Integrator;
+use point::{CALIBRATIONS, StrainPath, advance, parts, sand, shear};
+use sandboil_soil::{Integrator, SoilModel, StrainIncrement, Stress};
 
 /// Allowed rms difference of stress, kPa: ten times the reference's own uncertainty on the first two paths.
 const ALLOWED_RMS: f64 = 0.01;
@@ -41,5 +41,72 @@ fn default_part_finds_the_reversals_of_the_reference() {
             assert!(difference.rms <= allowed_rms, "{}: {} kPa", path.name, difference.rms);
             assert_eq!(difference.report.reversals, reversals, "{}", path.name);
         }
+    }
+}
+
+/// Mean stress, kPa, after six cycles of biaxial strain of 0.2 % from an isotropic stress of 100 kPa, in dense sand.
+/// Shear strain goes on all the while: forward by `forward` of the biaxial strain in the first two cycles, then back
+/// by `back` of it. Host steps are parts of `step`.
+#[expect(clippy::unwrap_used, reason = "the stress is one that the sand takes")]
+fn biaxial_cycles_with_shear([forward, back]: [f64; 2], integrator: &Integrator, step: f64) -> f64 {
+    const AMPLITUDE: f64 = 2e-3;
+    const HALF_CYCLES: u32 = 12;
+    let [_, _, dense] = CALIBRATIONS;
+    let sand = sand(dense);
+    let start = Stress { xx: -100.0, yy: -100.0, xy: 0.0, zz: -100.0 };
+    let mut state = sand.initialise(start, None).unwrap();
+    for half_cycle in 0..HALF_CYCLES {
+        let size = if half_cycle % 2 == 0 { step } else { -step };
+        let xy = step * if half_cycle < 4 { forward } else { -back };
+        let de = StrainIncrement { xx: size, yy: -size, xy, spin: 0.0 };
+        for _ in 0..parts(&shear(AMPLITUDE), step).0 {
+            advance(&sand, &mut state, &de, integrator);
+        }
+    }
+    state.mean_stress()
+}
+
+/// Parts for the examples of `docs/theory/pm4sand.md`, "Answers that need not converge".
+const STEPS: [f64; 5] = [1e-5, 5e-6, 4e-6, 2.5e-6, 1e-6];
+
+fn with_parts_of(max_increment: f64) -> [Integrator; 3] {
+    let tolerance = Integrator::DEFAULT_TOLERANCE;
+    let euler = Integrator::ModifiedEuler { tolerance, max_increment };
+    [euler, Integrator::RungeKutta4 { max_increment }, Integrator::Reference]
+}
+
+/// Least and largest mean stress over steps and integrators.
+fn range_over_steps(shear_rates: [f64; 2]) -> (f64, f64) {
+    let mut range = (f64::INFINITY, 0.0_f64);
+    for step in STEPS {
+        let p =
+            with_parts_of(step).map(|integrator| biaxial_cycles_with_shear(shear_rates, &integrator, step));
+        range = p.into_iter().fold(range, |(low, high), p| (low.min(p), high.max(p)));
+    }
+    range
+}
+
+/// While shear goes on, which origin a biaxial reversal keeps hangs on the sign of the xy component of the
+/// back-stress ratio. Here that component passes through zero at a reversal, and the step decides.
+#[test]
+fn a_biaxial_reversal_where_shear_stress_changes_sign_does_not_converge() {
+    let (low, high) = range_over_steps([0.05, 0.00784]);
+    assert!(low < 45.0 && high > 75.0, "{low} to {high} kPa");
+    // A tenth faster or slower back, and every step and integrator agrees.
+    for back in [0.007, 0.0086] {
+        let (low, high) = range_over_steps([0.05, back]);
+        assert!(high - low < 0.5, "{low} to {high} kPa");
+    }
+}
+
+/// The same in its plainest form: shear strain too small to matter, and another answer for each of its rates.
+#[test]
+fn a_vanishing_shear_strain_changes_the_answer_of_biaxial_cycles() {
+    let integrator = Integrator::default();
+    let step = Integrator::DEFAULT_INCREMENT;
+    let p = |forward: f64, back: f64| biaxial_cycles_with_shear([forward, back], &integrator, step);
+    assert!((p(0.0, 0.0) - 56.0).abs() < 0.1, "{}", p(0.0, 0.0));
+    for (back, expected) in [(0.1e-12, 55.8), (0.2e-12, 82.5), (1.3e-12, 39.3)] {
+        assert!((p(1e-12, back) - expected).abs() < 0.1, "{back}: {} kPa", p(1e-12, back));
     }
 }
