@@ -5,7 +5,7 @@ mod point;
 use point::{CALIBRATIONS, SIGMA_V0, anisotropic, sand};
 use sandboil_soil::elastic::Elastic;
 use sandboil_soil::laboratory::{Ending, Path, Record, Resolution, Shear, Specimen, Turn, Turns};
-use sandboil_soil::{Integrator, SoilModel};
+use sandboil_soil::{Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport};
 
 const STEP: f64 = 1e-5;
 
@@ -90,4 +90,237 @@ fn a_copy_goes_on_as_the_specimen_would_have_and_leaves_it() {
     assert_eq!(specimen.stress(), before);
     specimen.shear(&more, &mut records[1], &mut never);
     assert_eq!(records[0].rows(), records[1].rows());
+}
+
+fn simple_shear(turns: Vec<Turn>, drained: bool) -> Shear {
+    Shear { drained, turns: Turns::Each(turns), strain_step: STEP, strain_limit: 0.05 }
+}
+
+/// A model of two straight branches: shear stress rises with strain to a peak and falls from there to nothing.
+#[derive(Debug, Clone)]
+struct Softening;
+
+const PEAK_STRAIN: f64 = 1e-3;
+const SHEAR_MODULUS: f64 = 1e4;
+
+impl SoilModel for Softening {
+    type State = (Stress, f64);
+
+    fn initialise(&self, stress: Stress, _void_ratio: Option<f64>) -> Result<Self::State, SoilError> {
+        Ok((stress, 0.0))
+    }
+
+    fn update(
+        &self,
+        (stress, strain): &mut Self::State,
+        de: &StrainIncrement,
+        _integrator: &Integrator,
+    ) -> Result<UpdateReport, SoilError> {
+        *strain += de.xy;
+        let size = strain.abs();
+        stress.xy = SHEAR_MODULUS * size.min(2.0 * PEAK_STRAIN - size).max(0.0).copysign(*strain);
+        Ok(UpdateReport::default())
+    }
+
+    fn stress(&self, state: &Self::State) -> Stress {
+        state.0
+    }
+
+    fn moduli(&self, _state: &Self::State) -> Moduli {
+        Moduli { bulk: 2.0 * SHEAR_MODULUS, shear: SHEAR_MODULUS }
+    }
+
+    fn static_shear_modulus(&self) -> f64 {
+        SHEAR_MODULUS
+    }
+}
+
+#[test]
+fn a_softening_soil_that_never_reaches_the_turn_ends_at_the_strain_limit_without_going_back_in_cycles() {
+    let mut specimen = specimen(&Softening);
+    let mut record = Record::new(Resolution::EVERY);
+    let peak = SHEAR_MODULUS * PEAK_STRAIN;
+    let test = simple_shear(vec![Turn::Stress(0.5 * peak), Turn::Stress(-2.0 * peak)], false);
+    assert_eq!(specimen.shear(&test, &mut record, &mut never), Ending::StrainLimit);
+    let rows = record.rows();
+    assert_eq!(rows.last().unwrap().turns, 1);
+    assert!((specimen.strain()[2] + 0.05).abs() <= STEP);
+    assert!(rows.iter().all(|row| (0.0..=0.75).contains(&row.cycle)));
+}
+
+/// The largest stress on the way is the turn itself, to round-off: the peak of a softening branch still counts.
+#[test]
+fn a_turn_exactly_at_the_peak_is_met() {
+    let mut specimen = specimen(&Softening);
+    let mut record = Record::new(Resolution::TURNS);
+    let peak = SHEAR_MODULUS * PEAK_STRAIN;
+    let test = simple_shear(vec![Turn::Stress(peak), Turn::Strain(0.0)], false);
+    assert_eq!(specimen.shear(&test, &mut record, &mut never), Ending::Complete);
+    assert!((record.rows()[1].stress.xy - peak).abs() <= 1e-9 * peak);
+    assert!(record.rows()[2].strain[2].abs() <= 1e-9 * PEAK_STRAIN);
+}
+
+#[test]
+fn turns_may_be_where_the_specimen_already_is_or_behind_it() {
+    for drained in [false, true] {
+        let mut specimen = specimen(&sand(CALIBRATIONS[1]));
+        let mut record = Record::new(Resolution::TURNS);
+        let turns = [5.0, 5.0, 2.0, 1.0, 0.0, 0.0, -3.0].map(Turn::Stress).to_vec();
+        assert_eq!(specimen.shear(&simple_shear(turns, drained), &mut record, &mut never), Ending::Complete);
+        let found: Vec<f64> = record.rows().iter().map(|row| row.stress.xy).collect();
+        for (ours, wanted) in found.iter().zip([0.0, 5.0, 5.0, 2.0, 1.0, 0.0, 0.0, -3.0]) {
+            assert!((ours - wanted).abs() < 1e-6, "{found:?}");
+        }
+        assert_eq!(record.rows().len(), 8);
+        assert_eq!(record.rows().last().unwrap().cycle, 3.25);
+    }
+}
+
+/// A second test goes on from the strain and stress of the first; its limit counts from there.
+#[test]
+fn alternating_turns_behind_the_start_go_back_first() {
+    let mut specimen = specimen(&sand(CALIBRATIONS[1]));
+    let mut record = Record::new(Resolution::TURNS);
+    let test = simple_shear(vec![Turn::Stress(12.0)], false);
+    assert_eq!(specimen.shear(&test, &mut record, &mut never), Ending::Complete);
+    let before = specimen.strain()[2];
+    let turns = Turns::Alternating { odd: Turn::Stress(8.0), even: Turn::Stress(-8.0), count: 4 };
+    let test = Shear { turns, strain_limit: 1e-3, ..test };
+    assert_eq!(specimen.shear(&test, &mut record, &mut never), Ending::Complete);
+    assert_eq!(record.rows().len(), 6);
+    assert!(record.rows()[2].strain[2] < before);
+    for (row, wanted) in record.rows()[2..].iter().zip([8.0, -8.0, 8.0, -8.0]) {
+        assert!((row.stress.xy - wanted).abs() < 1e-6, "{row:?}");
+    }
+}
+
+/// Distances between turns down to the round-off of the stress itself, and below.
+#[test]
+fn turns_a_hair_apart_end() {
+    for drained in [false, true] {
+        let mut specimen = specimen(&sand(CALIBRATIONS[1]));
+        let mut record = Record::new(Resolution::TURNS);
+        let turns =
+            [1.0, 1.0 + 1e-3, 1.0, 1.0 + 1e-6, 1.0, 1.0 + 1e-9, 1.0, 1.0 + 1e-12, 1.0, 1.0 + 1e-15, 1.0];
+        let turns = turns.map(|share| Turn::Stress(10.0 * share)).to_vec();
+        let mut looks = 0;
+        let mut patience = || {
+            looks += 1;
+            looks > 100
+        };
+        let ending = specimen.shear(&simple_shear(turns, drained), &mut record, &mut patience);
+        assert_eq!(ending, Ending::Complete, "drained {drained}");
+        assert!(record.rows().iter().skip(1).all(|row| (row.stress.xy - 10.0).abs() < 0.011), "{record:?}");
+    }
+}
+
+/// Below `2 p_min`, here 1 kPa, the model's dilatancy jumps at the dilatancy surface, and no strain may give the
+/// stress: the test then says so, and whatever it has recorded is right.
+#[test]
+fn drained_shear_at_low_pressure_holds_its_vertical_stress_or_says_that_it_cannot() {
+    for (pressure, may_fail) in [(0.6, true), (5.0, false)] {
+        let start = Stress { xx: -0.5 * pressure, yy: -pressure, xy: 0.0, zz: -0.5 * pressure };
+        let model = sand(CALIBRATIONS[1]);
+        let mut specimen = Specimen::new(&model, start, None, Integrator::default()).unwrap();
+        let mut record = Record::new(Resolution::EVERY);
+        let turns = [5e-4, -5e-4].map(Turn::Strain).to_vec();
+        let ending = specimen.shear(&simple_shear(turns, true), &mut record, &mut never);
+        let failed = matches!(ending, Ending::StressNotCarried { .. });
+        assert!(ending == Ending::Complete || may_fail && failed, "{pressure} kPa: {ending:?}");
+        let held = record.rows().iter().map(|row| (row.stress.yy + pressure).abs());
+        assert!(held.fold(0.0, f64::max) <= 1e-7 * (1.0 + 2.0 * pressure));
+    }
+}
+
+#[test]
+fn numbers_that_lead_nowhere_are_refused_before_the_first_increment() {
+    let refused = |ending: Ending| assert!(matches!(ending, Ending::Refused(_)), "{ending:?}");
+    let mut specimen = specimen(&sand(CALIBRATIONS[1]));
+    let mut record = Record::new(Resolution::EVERY);
+    let good = simple_shear(vec![Turn::Strain(1e-3)], false);
+    for strain_step in [0.0, -1e-5, f64::NAN, f64::INFINITY] {
+        refused(specimen.shear(&Shear { strain_step, ..good.clone() }, &mut record, &mut never));
+        let path = Path { by_stress: [false; 3], rows: vec![[1e-3; 3]], strain_step };
+        refused(specimen.path(&path, &mut record, &mut never));
+    }
+    for strain_limit in [-1.0, f64::NAN] {
+        refused(specimen.shear(&Shear { strain_limit, ..good.clone() }, &mut record, &mut never));
+    }
+    for turn in [Turn::Stress(f64::NAN), Turn::Strain(f64::NAN), Turn::Strain(f64::INFINITY)] {
+        refused(specimen.shear(
+            &simple_shear(vec![Turn::Strain(1e-4), turn], false),
+            &mut record,
+            &mut never,
+        ));
+    }
+    for by_stress in [[false; 3], [true; 3]] {
+        for bad in [f64::NAN, f64::INFINITY] {
+            let rows = vec![[-50.0, bad, 0.0]];
+            refused(specimen.path(&Path { by_stress, rows, strain_step: STEP }, &mut record, &mut never));
+        }
+    }
+    assert_eq!(specimen.strain(), [0.0; 3]);
+}
+
+/// Legs shorter than the time between two looks must not keep the caller waiting.
+#[test]
+fn many_short_legs_and_one_long_leg_can_be_interrupted() {
+    let mut specimen = specimen(&sand(CALIBRATIONS[1]));
+    let mut record = Record::new(Resolution::TURNS);
+    let test = cyclic(0.02, false, 100_000);
+    assert_eq!(specimen.shear(&test, &mut record, &mut || true), Ending::Interrupted);
+    assert!(record.rows().len() < 1000, "{}", record.rows().len());
+    let mut looks = 0;
+    let mut second = || {
+        looks += 1;
+        looks > 1
+    };
+    let path = Path { by_stress: [false; 3], rows: vec![[0.0, 0.0, 1.0]], strain_step: STEP };
+    assert_eq!(specimen.path(&path, &mut record, &mut second), Ending::Interrupted);
+    assert!(specimen.strain()[2] < 0.5);
+}
+
+/// What was done before a failure stays done and recorded, and the specimen can go on from there.
+#[test]
+fn a_path_that_fails_midway_leaves_a_usable_specimen() {
+    let mut specimen = specimen(&sand(CALIBRATIONS[1]));
+    let mut record = Record::new(Resolution::TURNS);
+    let rows = vec![[-50.65, -SIGMA_V0, 10.0], [-50.65, -SIGMA_V0, 80.0], [-50.65, -SIGMA_V0, 0.0]];
+    let path = Path { by_stress: [true; 3], rows, strain_step: STEP };
+    assert!(matches!(specimen.path(&path, &mut record, &mut never), Ending::StressNotCarried { .. }));
+    assert_eq!(record.rows().iter().map(|row| row.turns).collect::<Vec<_>>(), [0, 1, 1]);
+    let last = *record.rows().last().unwrap();
+    assert_eq!((last.strain, last.stress), (specimen.strain(), specimen.stress()));
+    let back = Path { rows: vec![[-50.65, -SIGMA_V0, 0.0]], ..path };
+    assert_eq!(specimen.path(&back, &mut record, &mut never), Ending::Complete);
+    assert!(specimen.stress().xy.abs() < 1e-4);
+}
+
+#[test]
+fn a_leg_of_no_length_is_one_row() {
+    let mut specimen = specimen(&sand(CALIBRATIONS[1]));
+    let mut record = Record::new(Resolution::EVERY);
+    let here = specimen.stress();
+    let path = Path { by_stress: [true; 3], rows: vec![[here.xx, here.yy, here.xy]; 2], strain_step: STEP };
+    assert_eq!(specimen.path(&path, &mut record, &mut never), Ending::Complete);
+    assert_eq!(record.rows().len(), 3);
+    assert_eq!(specimen.strain(), [0.0; 3]);
+}
+
+/// A row is written where stress or strain has moved enough since the last one; turns and the end always.
+#[test]
+fn resolution_keeps_what_moved_enough_in_stress_or_in_strain() {
+    let run = |resolution: Resolution| {
+        let mut record = Record::new(resolution);
+        let rock = Elastic::new(4.0e4, 8.7e4).unwrap();
+        let test = simple_shear(vec![Turn::Strain(1e-3)], false);
+        assert_eq!(specimen(&rock).shear(&test, &mut record, &mut never), Ending::Complete);
+        record.rows().len()
+    };
+    // A hundred increments of 1e-5, or 0.4 kPa, and the start.
+    assert_eq!(run(Resolution::EVERY), 101);
+    assert_eq!(run(Resolution::TURNS), 2);
+    assert_eq!(run(Resolution { stress: f64::INFINITY, strain: 0.95e-4 }), 11);
+    assert_eq!(run(Resolution { stress: 3.9, strain: f64::INFINITY }), 11);
+    assert_eq!(run(Resolution { stress: 3.9, strain: 0.45e-4 }), 21);
 }

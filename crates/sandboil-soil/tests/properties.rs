@@ -45,6 +45,21 @@ fn strain_of(xx: f64, yy: f64, xy: f64) -> StrainIncrement {
     StrainIncrement { xx, yy, xy, spin: 0.0 }
 }
 
+/// The model leaves the out-of-plane stress to elasticity: its distance to the mean changes with volume alone.
+#[test]
+fn out_of_plane_stress_keeps_its_distance_to_the_mean_at_constant_volume() {
+    for integrator in [Integrator::default(), rk4()] {
+        let sand = sand(MEDIUM);
+        let mut state = consolidated(&sand);
+        let distance = |state: &State| sand.stress(state).zz + state.mean_stress();
+        let before = distance(&state);
+        for direction in [1.0, -1.0, 1.0] {
+            advance(&sand, &mut state, &shear(direction * 0.01), &integrator);
+            assert!((distance(&state) - before).abs() < 1e-9, "{} {before}", distance(&state));
+        }
+    }
+}
+
 /// Exponents of increments that stay clear of the bounding surface. On it a turning direction meets the infinite
 /// hardening of the image point, and round-off decides where a sub-step ends (`docs/theory/pm4sand.md`).
 const GENTLE: std::ops::Range<f64> = -6.0..-4.5;

@@ -38,6 +38,27 @@ pub enum Ending {
     Interrupted,
 }
 
+/// Increments between looks at whether the caller wants to stop.
+const INCREMENTS_PER_LOOK: u32 = 1024;
+
+/// Asks the caller now and then whether to stop, however short the legs of a test are.
+struct Watch<'a> {
+    stop: &'a mut dyn FnMut() -> bool,
+    increments: u32,
+}
+
+impl<'a> Watch<'a> {
+    fn new(stop: &'a mut dyn FnMut() -> bool) -> Self {
+        Self { stop, increments: 0 }
+    }
+
+    /// Counts an increment; true where the caller wants to stop.
+    fn interrupts(&mut self) -> bool {
+        self.increments = self.increments.wrapping_add(1);
+        self.increments.is_multiple_of(INCREMENTS_PER_LOOK) && (self.stop)()
+    }
+}
+
 /// A material point under test.
 pub struct Specimen {
     point: Box<dyn Point>,

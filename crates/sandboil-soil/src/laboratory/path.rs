@@ -1,12 +1,15 @@
 //! A path given row by row.
 
 use super::{
-    Ending, Record, Specimen,
+    Ending, Record, Specimen, Watch,
     control::{Compliance, Failure, Prescribed, components},
 };
-use crate::Stress;
+use crate::{
+    SoilError, Stress,
+    error::{finite, positive},
+};
 
-/// Smallest part of a leg that is still tried where the stress is not met.
+/// Smallest share of the usual part of a leg that is still tried where the stress is not met.
 const SMALLEST_PART: f64 = 1e-6;
 
 /// A path through prescribed strains and stresses, straight between rows.
@@ -20,17 +23,26 @@ pub struct Path {
     pub strain_step: f64,
 }
 
+impl Path {
+    /// Refuses what would never end, or mean nothing.
+    fn check(&self) -> Result<(), SoilError> {
+        positive("strain_step", self.strain_step)?;
+        self.rows.iter().flatten().try_for_each(|value| finite("path", *value).map(|_| ()))
+    }
+}
+
 impl Specimen {
     /// Leads the specimen along a path. The record gets its present state if it is empty, and one line for each row.
     pub fn path(&mut self, path: &Path, record: &mut Record, stop: &mut dyn FnMut() -> bool) -> Ending {
+        if let Err(error) = path.check() {
+            return Ending::Refused(error);
+        }
         if record.rows().is_empty() {
             record.keep(self.row(0.0, 0));
         }
+        let mut watch = Watch::new(stop);
         for (index, row) in path.rows.iter().enumerate() {
-            if stop() {
-                return Ending::Interrupted;
-            }
-            let ending = self.leg(path, *row, index, record);
+            let ending = self.leg(path, *row, index, record, &mut watch);
             let legs = if ending == Ending::Complete { index + 1 } else { index };
             record.keep(self.row(0.0, legs));
             if ending != Ending::Complete {
@@ -40,7 +52,14 @@ impl Specimen {
         Ending::Complete
     }
 
-    fn leg(&mut self, path: &Path, target: [f64; 3], legs: usize, record: &mut Record) -> Ending {
+    fn leg(
+        &mut self,
+        path: &Path,
+        target: [f64; 3],
+        legs: usize,
+        record: &mut Record,
+        watch: &mut Watch<'_>,
+    ) -> Ending {
         let by_stress = path.by_stress;
         let begin_strain = self.strain;
         let begin_stress = components(&self.stress());
@@ -55,6 +74,9 @@ impl Specimen {
         let mut compliance = Compliance::elastic(moduli, by_stress);
         let (mut done, mut part, mut slope) = (0.0_f64, usual, [0.0; 3]);
         while done < 1.0 {
+            if watch.interrupts() {
+                return Ending::Interrupted;
+            }
             // The last part ends at the target itself, whatever round-off the others left.
             let end = if done + part * (1.0 + SMALLEST_PART) >= 1.0 { 1.0 } else { done + part };
             let mut strain = [0.0; 3];
@@ -82,7 +104,7 @@ impl Specimen {
                     }
                 }
                 Err(Failure::Refused(error)) if !by_stress.contains(&true) => return Ending::Refused(error),
-                Err(_) if part > SMALLEST_PART => {
+                Err(_) if part > SMALLEST_PART * usual => {
                     part *= 0.25;
                     slope = [0.0; 3];
                     compliance = Compliance::elastic(self.point.moduli(), by_stress);

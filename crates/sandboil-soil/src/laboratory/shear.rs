@@ -1,8 +1,12 @@
 //! Direct simple shear to turning points: no lateral strain, and either constant volume or a held vertical stress.
 
 use super::{
-    Ending, Record, Specimen,
+    Ending, Record, Specimen, Watch,
     control::{Compliance, Failure, Prescribed},
+};
+use crate::{
+    SoilError,
+    error::{finite, positive},
 };
 
 /// Trials for the share of an increment that ends at a turn.
@@ -11,8 +15,6 @@ const TURN_TRIALS: usize = 60;
 const TURN_TOLERANCE: f64 = 1e-9;
 /// Smallest part of the strain step that is still tried where the vertical stress is not met.
 const SMALLEST_STEP: f64 = 1e-5;
-/// Increments between looks at whether the caller wants to stop.
-const STEPS_PER_LOOK: u32 = 1024;
 
 /// Where shear turns back.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +23,14 @@ pub enum Turn {
     Stress(f64),
     /// At this shear strain (engineering, total).
     Strain(f64),
+}
+
+impl Turn {
+    fn value(self) -> f64 {
+        match self {
+            Self::Stress(value) | Self::Strain(value) => value,
+        }
+    }
 }
 
 /// The sequence of turns.
@@ -63,6 +73,22 @@ pub struct Shear {
     pub strain_limit: f64,
 }
 
+impl Shear {
+    /// Refuses what would never end, or seem to end at once.
+    fn check(&self) -> Result<(), SoilError> {
+        positive("strain_step", self.strain_step)?;
+        if !(self.strain_limit > 0.0) {
+            let (name, value) = ("strain_limit", self.strain_limit);
+            return Err(SoilError::InvalidParameter { name, value, expected: "positive" });
+        }
+        let turns = match &self.turns {
+            Turns::Each(turns) => turns.as_slice(),
+            Turns::Alternating { odd, even, .. } => &[*odd, *even],
+        };
+        turns.iter().try_for_each(|turn| finite("turn", turn.value()).map(|_| ()))
+    }
+}
+
 /// One leg from turn to turn.
 struct Leg {
     turn: Turn,
@@ -83,9 +109,7 @@ impl Leg {
     }
 
     fn target(&self) -> f64 {
-        match self.turn {
-            Turn::Stress(value) | Turn::Strain(value) => value,
-        }
+        self.turn.value()
     }
 
     /// Cycles at the present value. Soil may soften on the way: cycles never go back beyond the last turn.
@@ -99,9 +123,13 @@ impl Leg {
 impl Specimen {
     /// Shears the specimen from turn to turn. The record gets its present state if it is empty, and every turn.
     pub fn shear(&mut self, test: &Shear, record: &mut Record, stop: &mut dyn FnMut() -> bool) -> Ending {
+        if let Err(error) = test.check() {
+            return Ending::Refused(error);
+        }
         if record.rows().is_empty() {
             record.keep(self.row(0.0, 0));
         }
+        let mut watch = Watch::new(stop);
         let start = self.strain[2];
         let vertical = self.stress().yy;
         let prescribed = Prescribed { by_stress: [false, test.drained, false], stress: [0.0, vertical, 0.0] };
@@ -118,7 +146,7 @@ impl Specimen {
             };
             leg.from = leg.value(self);
             leg.direction = (leg.target() - leg.from).signum();
-            let ending = self.shear_leg(test, &leg, start, &prescribed, &mut compliance, record, stop);
+            let ending = self.shear_leg(test, &leg, start, &prescribed, &mut compliance, record, &mut watch);
             if ending != Ending::Complete {
                 record.keep(self.row(leg.cycle(leg.value(self)), turns));
                 return ending;
@@ -138,16 +166,15 @@ impl Specimen {
         prescribed: &Prescribed,
         compliance: &mut Compliance,
         record: &mut Record,
-        stop: &mut dyn FnMut() -> bool,
+        watch: &mut Watch<'_>,
     ) -> Ending {
         if test.drained {
             *compliance = Compliance::elastic(self.point.moduli(), prescribed.by_stress);
         }
         let tolerance = TURN_TOLERANCE * (leg.target() - leg.from).abs();
-        let (mut step, mut vertical_slope, mut steps) = (test.strain_step, 0.0, 0_u32);
+        let (mut step, mut vertical_slope) = (test.strain_step, 0.0);
         while leg.direction * (leg.target() - leg.value(self)) > tolerance {
-            steps = steps.wrapping_add(1);
-            if steps.is_multiple_of(STEPS_PER_LOOK) && stop() {
+            if watch.interrupts() {
                 return Ending::Interrupted;
             }
             let size = match leg.turn {

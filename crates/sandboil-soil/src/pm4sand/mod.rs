@@ -20,9 +20,7 @@ pub use parameters::{Constants, Options, PM4Sand, Parameters};
 pub use state::State;
 pub use surfaces::Surfaces;
 
-use crate::{
-    Deviator, Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport, error::finite,
-};
+use crate::{Deviator, Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport};
 use state::Strain;
 
 /// Most parts of one increment, so that an integrator with tiny (or no) parts is refused instead of never ending.
