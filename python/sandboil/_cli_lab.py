@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import csv
+import warnings
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -16,6 +17,9 @@ from ._style import DPI
 from .discretise import Floats
 from .lab._arguments import Integrator
 from .materials import Material, PM4Sand, material
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 app = typer.Typer(help="Test a soil at one point.", no_args_is_help=True)
 
@@ -30,6 +34,8 @@ K0Option = Annotated[float, typer.Option("--K0", help="Horizontal over vertical 
 BiasOption = Annotated[float, typer.Option(help="Static shear stress over sigma_v0.")]
 VoidRatioOption = Annotated[float | None, typer.Option(help="At the start; default the soil's own.")]
 IntegratorOption = Annotated[Integrator, typer.Option(help="Of rate-type models.")]
+PlotOption = Annotated[Path | None, typer.Option(help="Picture, PNG, PDF or SVG.")]
+CyclesOption = Annotated[float, typer.Option(help="Uniform cycles, counted by halves.")]
 OutOption = Annotated[Path | None, typer.Option(help="CSV for the record.")]
 
 # Levels that the summary of a cyclic test counts cycles to.
@@ -69,7 +75,7 @@ def dss(
     gamma_max: Annotated[float, typer.Option(help="Shear strain that ends a monotonic test.")] = 0.10,
     integrator: IntegratorOption = "default",
     out: OutOption = None,
-    plot: Annotated[Path | None, typer.Option(help="Picture, PNG, PDF or SVG.")] = None,
+    plot: PlotOption = None,
 ) -> None:
     """Direct simple shear, cyclic (--csr) or --monotonic; prints what one asks of such a test."""
     common: dict[str, Any] = {
@@ -94,10 +100,7 @@ def dss(
     if out is not None:
         _write(out, test.columns())
     if plot is not None:
-        try:
-            test.plot().savefig(plot, dpi=DPI)
-        except (OSError, ValueError) as error:
-            raise InvalidInput("--plot", str(plot), f"must be a writable picture: {error}") from error
+        _draw(plot, test.plot())
     _stop_if_incomplete(test)
 
 
@@ -159,6 +162,95 @@ def strain_path(
     _stop_if_incomplete(test)
 
 
+@app.command()
+def calibrate(
+    Dr: DrOption = None,
+    G0: G0Option = None,
+    crr: Annotated[float | None, typer.Option(help="Cyclic resistance ratio to meet.")] = None,
+    spt: Annotated[float | None, typer.Option(help="(N1)60cs, for what is not given.")] = None,
+    cpt: Annotated[float | None, typer.Option(help="q_c1Ncs, for what is not given.")] = None,
+    cycles: CyclesOption = 15.0,
+    gamma_sa: Annotated[float, typer.Option(help="Single-amplitude shear strain to reach.")] = 0.03,
+    sigma_v0: SigmaOption = 101.3,
+    K0: K0Option = 0.5,
+    static_shear_ratio: BiasOption = 0.0,
+    void_ratio: VoidRatioOption = None,
+    integrator: IntegratorOption = "default",
+    out: Annotated[
+        Path | None, typer.Option(help="TOML for the material, as a scene and --soil take it.")
+    ] = None,
+    plot: PlotOption = None,
+) -> None:
+    """Find PM4Sand's contraction rate for a cyclic resistance; prints the material as TOML."""
+    estimated: dict[str, float] = {}
+    if spt is not None or cpt is not None:
+        estimated = lab.correlations.estimates(N160cs=spt, qc1Ncs=cpt, sigma_v0=sigma_v0)
+    given = {name: value for name, value in {"Dr": Dr, "G0": G0, "crr": crr}.items() if value is not None}
+    asked: dict[str, Any] = estimated | given
+    for name in ("Dr", "G0", "crr"):
+        if name not in asked:
+            raise InvalidInput(f"--{name}", None, "is required unless --spt or --cpt says it")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", lab.CalibrationWarning)
+        result = lab.calibration(
+            **asked,
+            cycles=cycles,
+            gamma_sa=gamma_sa,
+            sigma_v0=sigma_v0,
+            K0=K0,
+            static_shear_ratio=static_shear_ratio,
+            void_ratio=void_ratio,
+            integrator=integrator,
+        )
+    for warning in told:
+        typer.echo(f"warning: {warning.message}", err=True)
+    text = _toml.text(result.soil.model_dump(exclude_none=True))
+    typer.echo(
+        f"# CRR {result.achieved:.4g} in {cycles:g} cycles, {result.target:.4g} asked for\n{text}", nl=False
+    )
+    if out is not None:
+        _write_text(out, text)
+    if plot is not None:
+        _draw(plot, result.plot())
+
+
+@app.command()
+def crr(
+    Dr: DrOption = None,
+    G0: G0Option = None,
+    hpo: HpoOption = None,
+    soil: SoilOption = None,
+    csr: Annotated[list[float] | None, typer.Option(help="Stress ratio to test; may be repeated.")] = None,
+    max_cycles: Annotated[int, typer.Option(help="Cycles that end a test.")] = 500,
+    sigma_v0: SigmaOption = 101.3,
+    K0: K0Option = 0.5,
+    static_shear_ratio: BiasOption = 0.0,
+    void_ratio: VoidRatioOption = None,
+    integrator: IntegratorOption = "default",
+    out: OutOption = None,
+    plot: PlotOption = None,
+) -> None:
+    """CSR against cycles for the three usual criteria, by default at eight ratios around 15 cycles."""
+    curve = lab.crr_curve(
+        soil_of(soil, Dr=Dr, G0=G0, hpo=hpo),
+        csr,
+        max_cycles=max_cycles,
+        sigma_v0=sigma_v0,
+        K0=K0,
+        static_shear_ratio=static_shear_ratio,
+        void_ratio=void_ratio,
+        integrator=integrator,
+    )
+    typer.echo(f"{'CSR':>8}" + "".join(f"{name:>24}" for name in curve.cycles))
+    for row, ratio in enumerate(curve.csr):
+        cells = (f"{cycles[row]:>24.2f}".replace("  nan", "never") for cycles in curve.cycles.values())
+        typer.echo(f"{ratio:>8.4f}" + "".join(cells))
+    if out is not None:
+        _write(out, curve.columns())
+    if plot is not None:
+        _draw(plot, curve.plot())
+
+
 def _strains(path: Path) -> Floats:
     names = ("eps_xx", "eps_yy", "gamma_xy")
     try:
@@ -179,8 +271,19 @@ def _csv(columns: dict[str, NDArray[Any]]) -> str:
 
 
 def _write(path: Path, columns: dict[str, NDArray[Any]]) -> None:
+    _write_text(path, _csv(columns))
+
+
+def _draw(path: Path, figure: Figure) -> None:
     try:
-        path.write_text(_csv(columns), encoding="utf-8")
+        figure.savefig(path, dpi=DPI)
+    except (OSError, ValueError) as error:
+        raise InvalidInput("--plot", str(path), f"must be a writable picture: {error}") from error
+
+
+def _write_text(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise InvalidInput("--out", str(path), f"must be writable: {error.strerror}") from error
 

@@ -1,10 +1,12 @@
-"""TOML from a user: read and parsed, refused as any other input is."""
+"""TOML from and to a user: what is read is refused as any other input is."""
 
 from __future__ import annotations
 
 import tomllib
 from pathlib import Path
 from typing import Any
+
+import tomli_w
 
 from ._errors import InvalidInput
 
@@ -25,3 +27,8 @@ def parse(text: str, label: str, origin: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InvalidInput(label, origin, f"must be TOML: {error}") from error
+
+
+def text(table: dict[str, Any]) -> str:
+    """A table as TOML."""
+    return tomli_w.dumps(table)

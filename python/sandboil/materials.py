@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -101,54 +100,34 @@ class PM4Sand(Model):
         ) -> None: ...
 
     @classmethod
-    def from_spt(cls, N160cs: float, crr: float | None = None, **options: Any) -> PM4Sand:
+    def from_spt(cls, N160cs: float, **options: Any) -> PM4Sand:
         """Sand of a clean-sand corrected blow count (N1)60cs, calibrated to a cyclic resistance.
 
-        Dr and G0 by :mod:`sandboil.lab.correlations` (Idriss and Boulanger 2008; Boulanger and Ziotopoulou
-        2017) unless `options` give them; `hpo` by :func:`sandboil.lab.calibrate_hpo` for the resistance `crr`
-        in 15 cycles, by default that of the correlation at the overburden `sigma_v0` (kPa). Further `options`
-        go to the calibration. Raises :class:`InvalidInput`.
+        Dr, G0 and the resistance `crr` in 15 cycles by :func:`sandboil.lab.correlations.estimates` (Idriss
+        and Boulanger 2008; Boulanger and Ziotopoulou 2017) unless `options` give them, at the overburden
+        `sigma_v0` (kPa, default one atmosphere); `hpo` by :func:`sandboil.lab.calibrate_hpo`, which takes all
+        further `options`. Raises :class:`InvalidInput`.
         """
-        from .lab import correlations
-
-        density = correlations.relative_density_from_spt(N160cs)
-        return cls._from_test(density, N160cs, crr, correlations.crr_from_spt, N160cs, options)
+        return cls._calibrated({"N160cs": N160cs}, options)
 
     @classmethod
-    def from_cpt(cls, qc1Ncs: float, crr: float | None = None, **options: Any) -> PM4Sand:
-        """Sand of a clean-sand normalised cone resistance q_c1Ncs; else as :meth:`from_spt`, with the
-        correlations of Boulanger and Ziotopoulou (2017) and Boulanger and Idriss (2014)."""
-        from .lab import correlations
-
-        density = correlations.relative_density_from_cpt(qc1Ncs)
-        blows = correlations.spt_from_relative_density(density)
-        return cls._from_test(density, blows, crr, correlations.crr_from_cpt, qc1Ncs, options)
+    def from_cpt(cls, qc1Ncs: float, **options: Any) -> PM4Sand:
+        """Sand of a clean-sand normalised cone resistance q_c1Ncs (Boulanger and Idriss 2014); else as
+        :meth:`from_spt`."""
+        return cls._calibrated({"qc1Ncs": qc1Ncs}, options)
 
     @classmethod
-    def from_density(cls, Dr: float, crr: float | None = None, **options: Any) -> PM4Sand:
+    def from_density(cls, Dr: float, **options: Any) -> PM4Sand:
         """Sand of a relative density; else as :meth:`from_spt` of (N1)60cs = 46 Dr^2."""
-        from .lab import correlations
-
-        blows = correlations.spt_from_relative_density(Dr)
-        return cls._from_test(Dr, blows, crr, correlations.crr_from_spt, blows, options)
+        return cls._calibrated({"Dr": Dr}, options)
 
     @classmethod
-    def _from_test(
-        cls,
-        density: float,
-        blows: float,
-        crr: float | None,
-        resistance: Callable[[float], float],
-        measured: float,
-        options: dict[str, Any],
-    ) -> PM4Sand:
+    def _calibrated(cls, measured: dict[str, float], options: dict[str, Any]) -> PM4Sand:
+        # The laboratory tests materials, so it cannot be there before them.
         from .lab import calibrate_hpo, correlations
 
-        if crr is None:
-            overburden = correlations.k_sigma(options.get("sigma_v0", correlations.P_ATM), N160cs=blows)
-            crr = overburden * resistance(measured)
-        defaults = {"Dr": density, "G0": correlations.shear_modulus_coefficient(blows)}
-        return calibrate_hpo(crr=crr, **(defaults | options))
+        overburden = {name: options[name] for name in ("sigma_v0",) if name in options}
+        return calibrate_hpo(**(correlations.estimates(**measured, **overburden) | options))
 
     @model_validator(mode="after")
     def _void_ratios_ordered(self) -> PM4Sand:

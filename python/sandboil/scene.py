@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import shapely
-import tomli_w
 from pydantic import BeforeValidator, Field, StrictBool, ValidationInfo, field_validator, model_validator
 from shapely.geometry.base import BaseGeometry
 
@@ -934,7 +933,7 @@ class Scene(Model):
         defaults change. Either way :meth:`from_toml` gives an equal scene.
         """
         said: dict[str, Any] = self.model_dump(exclude_none=True, exclude_unset=not resolved)
-        text = tomli_w.dumps(said)
+        text = _toml.text(said)
         if path is not None:
             try:
                 Path(path).write_text(text, encoding="utf-8")

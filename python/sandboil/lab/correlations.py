@@ -114,3 +114,34 @@ def k_alpha(static_shear_ratio: float, *, Dr: float, sigma_v0: float, K0: float 
     b = math.exp(-1.11 + 12.3 * alpha**2 + 1.31 * math.log(alpha + 0.0001))
     c = 0.138 + 0.126 * alpha + 2.52 * alpha**3
     return a + b * math.exp(-index / c)
+
+
+def estimates(
+    *,
+    N160cs: float | None = None,
+    qc1Ncs: float | None = None,
+    Dr: float | None = None,
+    sigma_v0: float = P_ATM,
+) -> dict[str, float]:
+    """`Dr`, `G0` and `crr` of a sand from one field test or from its density, by the correlations above.
+
+    The resistance is that at the vertical effective stress `sigma_v0`, kPa, through :func:`k_sigma`.
+    """
+    given = [
+        name for name, value in {"N160cs": N160cs, "qc1Ncs": qc1Ncs, "Dr": Dr}.items() if value is not None
+    ]
+    if len(given) != 1:
+        raise InvalidInput("correlations.estimates", given, "needs exactly one of N160cs, qc1Ncs and Dr")
+    if qc1Ncs is not None:
+        density, resistance = relative_density_from_cpt(qc1Ncs), crr_from_cpt(qc1Ncs)
+    elif N160cs is not None:
+        density, resistance = relative_density_from_spt(N160cs), crr_from_spt(N160cs)
+    else:
+        assert Dr is not None
+        density, resistance = Dr, crr_from_spt(spt_from_relative_density(Dr))
+    blows = spt_from_relative_density(density)
+    return {
+        "Dr": density,
+        "G0": shear_modulus_coefficient(blows),
+        "crr": resistance * k_sigma(sigma_v0, N160cs=blows),
+    }
