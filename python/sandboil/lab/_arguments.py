@@ -49,11 +49,18 @@ def _as_path(value: object) -> Floats:
     return array
 
 
+def _within(array: Floats, limit: float, remedy: str) -> Floats:
+    if np.abs(array).max() > limit:
+        raise ValueError(f"must lie within {limit:g}: {remedy}")
+    return array
+
+
 def _as_strain_path(value: object) -> Floats:
-    path = _as_path(value)
-    if np.abs(path).max() > _STRAIN_MAX:
-        raise ValueError(f"must lie within {_STRAIN_MAX:g}: strains are fractions, 5 % is written 0.05")
-    return path
+    return _within(_as_path(value), _STRAIN_MAX, "strains are fractions, 5 % is written 0.05")
+
+
+def _as_stress_path(value: object) -> Floats:
+    return _within(_as_path(value), _specimen.SIGMA_MAX, "stresses are in kPa")
 
 
 def _as_amplitudes(value: object) -> Floats:
@@ -73,14 +80,22 @@ def _as_stress(value: object) -> Floats:
     array = _finite(value, 1, "3 or 4 components xx, yy, xy and zz")
     if len(array) not in (3, 4):
         raise ValueError(f"must have 3 or 4 components xx, yy, xy and zz, not {len(array)}")
-    return array
+    return _within(array, _specimen.SIGMA_MAX, "stresses are in kPa")
 
 
 Soil = Annotated[_specimen.Soil, PlainValidator(_specimen.as_soil)]
 Pressure = Annotated[
-    Number, Field(gt=0.0, description="vertical effective stress, kPa, compression positive")
+    Number,
+    Field(
+        gt=0.0,
+        le=_specimen.SIGMA_MAX,
+        description="vertical effective stress, kPa, compression positive",
+    ),
 ]
-EarthPressure = Annotated[Number, Field(gt=0.0, description="horizontal over vertical effective stress")]
+EarthPressure = Annotated[
+    Number,
+    Field(gt=0.0, le=_specimen.K0_MAX, description="horizontal over vertical effective stress"),
+]
 Ratio = Annotated[Number, Field(gt=0.0, description="cyclic shear stress over sigma_v0")]
 Bias = Annotated[Number, Field(description="static shear stress over sigma_v0")]
 VoidRatio = Annotated[Number, Field(gt=0.0, description="void ratio at the start of the test")] | None
@@ -101,8 +116,8 @@ Tolerance = (
     | None
 )
 Series = Annotated[ArrayLike, PlainValidator(_as_series)]
-Path = Annotated[ArrayLike, PlainValidator(_as_path)]
 StrainPath = Annotated[ArrayLike, PlainValidator(_as_strain_path)]
+StressPath = Annotated[ArrayLike, PlainValidator(_as_stress_path)]
 Amplitudes = Annotated[ArrayLike, PlainValidator(_as_amplitudes)]
 Tested = Annotated[ShearTest, PlainValidator(_as_tested)]
 Stress = Annotated[ArrayLike, PlainValidator(_as_stress)]

@@ -21,9 +21,9 @@ Components = tuple[float, float, float, float]
 
 # Bisections for the edge of what a soil carries: six digits of the range they begin with.
 _BISECTIONS = 24
-# Ends of the search for K0 and for sigma_v0 that a soil carries: beyond any that occurs.
-_K0_MAX = 100.0
-_SIGMA_MAX = 1.0e5
+# Largest K0, and largest vertical effective stress, kPa: far beyond any sand and any depth, so slips.
+K0_MAX = 100.0
+SIGMA_MAX = 1.0e5
 
 
 @runtime_checkable
@@ -108,13 +108,13 @@ def consolidated(
 
     if not carried(sigma_v0, K0, static_shear_ratio):
         if not carried(sigma_v0, 1.0, 0.0):
-            least = _edge(lambda value: carried(value, 1.0, 0.0), _SIGMA_MAX, sigma_v0)
+            least = _edge(lambda value: carried(value, 1.0, 0.0), SIGMA_MAX, sigma_v0)
             raise InvalidInput(
                 f"{where}.sigma_v0", sigma_v0, f"must be at least {least:.4g} kPa for this soil to carry it"
             )
         if not carried(sigma_v0, K0, 0.0):
             least, most = (
-                _edge(lambda value: carried(sigma_v0, value, 0.0), 1.0, end) for end in (0.0, _K0_MAX)
+                _edge(lambda value: carried(sigma_v0, value, 0.0), 1.0, end) for end in (0.0, K0_MAX)
             )
             raise InvalidInput(
                 f"{where}.K0",
