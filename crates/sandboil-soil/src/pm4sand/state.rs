@@ -50,7 +50,7 @@ pub(super) struct Offset {
     pub out_of_plane: f64,
 }
 
-/// State of one PM4Sand stress point. Made by [`super::PM4Sand::initialise`]; all tensors in the material frame,
+/// State of one PM4Sand stress point. Made by [`crate::SoilModel::initialise`]; all tensors in the material frame,
 /// compression positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State {
