@@ -142,6 +142,7 @@ def test_a_target_out_of_reach_is_warned_of():
         (lambda: correlations.crr_from_spt(60.0), "correlations.N160cs"),
         (lambda: correlations.relative_density_from_cpt(5.0), "correlations.qc1Ncs"),
         (lambda: correlations.k_sigma(100.0), "correlations.k_sigma"),
+        (lambda: correlations.estimates(Dr=0.5, N160cs=10.0), "correlations.estimates"),
         (lambda: sb.PM4Sand.from_spt(N160cs=-1.0), "correlations.N160cs"),
     ],
 )

@@ -254,6 +254,28 @@ def test_a_strain_path_gives_stresses_as_csv(tmp_path: Path) -> None:
     assert out.read_text() == told.stdout
 
 
+def test_calibration_prints_a_material_that_the_laboratory_and_a_scene_take(tmp_path: Path) -> None:
+    out, picture = tmp_path / "sand.toml", tmp_path / "curve.png"
+    told = called("lab", "calibrate", "--spt", 6, "--G0", 470, "--out", out, "--plot", picture)
+    assert (told.returncode, told.stderr) == (DONE, "")
+    assert told.stdout.startswith("# CRR 0.09")
+    assert told.stdout.endswith(out.read_text())
+    assert picture.stat().st_size > 0
+    assert "G0 = 470.0" in out.read_text()
+    curve = called("lab", "crr", "--soil", out, "--csr", 0.092, "--csr", 0.03, "--max-cycles", 30)
+    assert curve.returncode == DONE
+    _, reached, missed = curve.stdout.splitlines()
+    assert float(reached.split()[1]) == pytest.approx(15.0, abs=0.51)
+    assert missed.split() == ["0.0300", "never", "never", "never"]
+
+
+def test_a_resistance_that_cannot_be_calibrated_is_warned_of() -> None:
+    told = called("lab", "calibrate", "--Dr", 0.35, "--G0", 476, "--crr", 1.2)
+    assert told.returncode == DONE
+    assert "warning: crr = 1.2 in 15 cycles cannot be met" in told.stderr
+    assert "--G0" in refused("lab", "calibrate", "--Dr", 0.5, "--crr", 0.1)
+
+
 def test_slips_in_the_laboratory_are_refused(tmp_path: Path) -> None:
     soil, path = tmp_path / "soil.toml", tmp_path / "path.csv"
     assert "material.hpo = None: is required" in refused("lab", "dss", "--Dr", 0.5, "--G0", 600, "--csr", 0.1)

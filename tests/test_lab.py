@@ -367,6 +367,11 @@ def test_pictures_show_the_test_and_what_it_is_compared_with(cyclic: lab.CyclicT
     drained = lab.cyclic_dss(SAND, csr=0.1, max_cycles=2, drained=True)
     assert labelled(drained.plot())[2] == ("cycles, 1", "contraction, %")
     assert len(labelled(lab.monotonic_dss(SAND, gamma_max=0.01).plot())) == 3
+    compressed = lab.plane_strain_compression(SAND, axial_strain_max=0.01)
+    assert labelled(compressed.plot(reference=compressed))[2][1] == "excess pore pressure, kPa"
+    assert labelled(lab.reconsolidation(cyclic).plot())[0][0] == "contraction, %"
+    path = lab.strain_path(SAND, stress0=(-50, -100, 0), strain=[(0, 0, 1e-3), (0, 0, 0)])
+    assert labelled(path.plot(reference=path))[0] == ("shear strain xy, %", "shear stress xy, kPa")
     curve = lab.modulus_reduction(SAND, strains=[1e-5, 1e-4])
     assert [y for _, y in labelled(curve.plot(reference=curve))] == ["$G/G_{max}$, 1", "damping ratio, %"]
 

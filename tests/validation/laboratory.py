@@ -33,7 +33,8 @@ CRITERIA = {
     "N_gamma_3pct": {"gamma_sa": 0.03},
     "N_gamma_5pct": {"gamma_sa": 0.05},
 }
-# Strain up to which the monotonic tests of the reference are converged in its increment (docs/validation.md).
+# Strain up to which a monotonic test of the reference is converged in its increment; the same test is there
+# again with a finer one.
 CONVERGED = {"mono_undrained_Dr35": 0.05}
 
 SANDS = {
@@ -153,8 +154,8 @@ def _cycle_lines() -> list[str]:
 
 def _monotonic_lines() -> list[str]:
     lines = [
-        "| test | to | tau, largest difference | vertical stress |",
-        "|---|---|---|---|",
+        "| test | increment of OpenSees | to | tau, largest difference | vertical stress |",
+        "|---|---|---|---|---|",
     ]
     for name in MONOTONIC:
         case = CASES[name]
@@ -167,7 +168,8 @@ def _monotonic_lines() -> list[str]:
             ]
             kind = "drained" if case["drained"] else "undrained"
             lines.append(
-                f"| {kind}, D_r {case['Dr']:g} | {100 * limit:g} % | {off[0]:.2f} % | {off[1]:.2f} % |"
+                f"| {kind}, D_r {case['Dr']:g} | {case['increment']:g} | {100 * limit:g} % "
+                f"| {off[0]:.2f} % | {off[1]:.2f} % |"
             )
     return lines
 

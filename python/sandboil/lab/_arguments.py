@@ -129,24 +129,30 @@ def checked(test: Callable[_P, _R]) -> Callable[_P, _R]:
     Raises :class:`InvalidInput` with a path such as ``lab.cyclic_dss.csr``; an unknown keyword is told with
     the nearest right one.
     """
-    hints = typing.get_type_hints(test, include_extras=True)
-    parameters = inspect.signature(test).parameters.values()
-    fields: dict[str, Any] = {
-        parameter.name: (
-            hints[parameter.name],
-            ... if parameter.default is inspect.Parameter.empty else parameter.default,
+
+    @functools.cache
+    def arguments() -> type[Model]:
+        # Made when the test is first called: whoever only runs scenes does not wait for it.
+        hints = typing.get_type_hints(test, include_extras=True)
+        parameters = inspect.signature(test).parameters.values()
+        fields: dict[str, Any] = {
+            parameter.name: (
+                hints[parameter.name],
+                ... if parameter.default is inspect.Parameter.empty else parameter.default,
+            )
+            for parameter in parameters
+        }
+        made = create_model(test.__name__, __base__=Model, **fields)
+        made._label = f"lab.{test.__name__}"
+        made._positional = tuple(
+            parameter.name for parameter in parameters if parameter.kind is not inspect.Parameter.KEYWORD_ONLY
         )
-        for parameter in parameters
-    }
-    arguments = create_model(test.__name__, __base__=Model, **fields)
-    arguments._label = f"lab.{test.__name__}"
-    arguments._positional = tuple(
-        parameter.name for parameter in parameters if parameter.kind is not inspect.Parameter.KEYWORD_ONLY
-    )
+        return made
 
     @functools.wraps(test)
     def checking(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-        valid = arguments(*args, **kwargs)
-        return typing.cast(Callable[..., _R], test)(**{name: getattr(valid, name) for name in fields})
+        valid = arguments()(*args, **kwargs)
+        given = {name: getattr(valid, name) for name in type(valid).model_fields}
+        return typing.cast(Callable[..., _R], test)(**given)
 
     return checking

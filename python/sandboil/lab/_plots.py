@@ -13,7 +13,15 @@ from matplotlib.figure import Figure
 from .._errors import InvalidInput
 from .._style import OURS, REFERENCE, STYLE
 from ..discretise import Floats
-from ._results import CyclicTest, ModulusReduction, Record, ShearTest
+from ._results import (
+    CompressionTest,
+    CyclicTest,
+    ModulusReduction,
+    PathTest,
+    Reconsolidation,
+    Record,
+    ShearTest,
+)
 
 # End of an axis over its largest value.
 _MARGIN = 1.05
@@ -27,6 +35,14 @@ _QUANTITIES = {
     "cycle": ("cycles, 1", 1.0),
     "G_ratio": ("$G/G_{max}$, 1", 1.0),
     "damping": ("damping ratio, %", 100.0),
+    "axial_strain": ("vertical strain, %", 100.0),
+    "p": ("mean effective stress in the plane, kPa", 1.0),
+    "q": ("vertical less horizontal stress, kPa", 1.0),
+    "excess_pore_pressure": ("excess pore pressure, kPa", 1.0),
+    "gamma_xy": ("shear strain xy, %", 100.0),
+    "tau_xy": ("shear stress xy, kPa", 1.0),
+    "mean": ("mean stress in the plane, tension positive, kPa", 1.0),
+    "volume": ("expansion, %", 100.0),
 }
 
 
@@ -61,6 +77,27 @@ def modulus(test: ModulusReduction, reference: object | None) -> Figure:
     return figure
 
 
+def compression(test: CompressionTest, reference: object | None) -> Figure:
+    """Stress-strain curve, stress path, and pore pressure (drained: contraction) over strain."""
+    panels = [
+        ("axial_strain", "q"),
+        ("p", "q"),
+        ("axial_strain", "eps_v" if test.eps_v.any() else "excess_pore_pressure"),
+    ]
+    return _drawn(test, reference, panels, (1, 3))
+
+
+def reconsolidation(test: Reconsolidation, reference: object | None) -> Figure:
+    """Vertical effective stress over contraction, and the shear stress and strain that go with it."""
+    return _drawn(test, reference, [("eps_v", "sigma_v_eff"), ("sigma_v_eff", "tau")], (1, 2))
+
+
+def path(test: PathTest, reference: object | None) -> Figure:
+    """Shear stress over shear strain and over mean stress, and mean stress over volume."""
+    panels = [("gamma_xy", "tau_xy"), ("mean", "tau_xy"), ("volume", "mean")]
+    return _drawn(test, reference, panels, (1, 3))
+
+
 def _drawn(
     test: Record, reference: object | None, panels: list[tuple[str, str]], shape: tuple[int, int]
 ) -> Figure:
@@ -73,7 +110,7 @@ def _drawn(
                 _draw(axes, reference, names, {"color": REFERENCE, "ls": "--", "label": "reference"})
             (x, y) = names
             axes.set(xlabel=_QUANTITIES[x][0], ylabel=_QUANTITIES[y][0])
-            if x in ("sigma_v_eff", "cycle"):
+            if x in ("sigma_v_eff", "cycle", "p"):
                 axes.set_xlim(0.0, _MARGIN * axes.dataLim.x1)
         if reference is not None:
             figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)

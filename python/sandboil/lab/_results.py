@@ -211,6 +211,33 @@ class PathTest(Record):
             "void_ratio": self.void_ratio,
         }
 
+    @property
+    def gamma_xy(self) -> Floats:
+        """Engineering shear strain, 1."""
+        return self.strain[:, 2]
+
+    @property
+    def tau_xy(self) -> Floats:
+        """Shear stress, kPa."""
+        return self.stress[:, 2]
+
+    @property
+    def mean(self) -> Floats:
+        """Mean stress in the plane, kPa, tension positive."""
+        return 0.5 * (self.stress[:, 0] + self.stress[:, 1])
+
+    @property
+    def volume(self) -> Floats:
+        """Volumetric strain, 1, expansion positive."""
+        return self.strain[:, 0] + self.strain[:, 1]
+
+    def plot(self, reference: object | None = None) -> Figure:
+        """Shear stress over shear strain and over mean stress, and mean stress over volume; `reference` has
+        `gamma_xy`, `tau_xy`, `mean` and `volume`."""
+        from ._plots import path
+
+        return path(self, reference)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CompressionTest(Record):
@@ -250,6 +277,13 @@ class CompressionTest(Record):
     def _names(cls) -> list[str]:
         return [*super()._names(), "p", "q", "excess_pore_pressure"]
 
+    def plot(self, reference: object | None = None) -> Figure:
+        """Stress difference over strain and over mean stress, and pore pressure or contraction over strain;
+        `reference` has arrays of the same names."""
+        from ._plots import compression
+
+        return compression(self, reference)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Reconsolidation(Record):
@@ -270,6 +304,13 @@ class Reconsolidation(Record):
     gamma: Floats
     tau: Floats
     void_ratio: Floats
+
+    def plot(self, reference: object | None = None) -> Figure:
+        """Vertical effective stress over contraction, and shear stress over it; `reference` has arrays of the
+        same names."""
+        from ._plots import reconsolidation
+
+        return reconsolidation(self, reference)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
