@@ -60,7 +60,8 @@ fn biaxial_cycles_with_shear([forward, back]: [f64; 2], integrator: &Integrator,
         let xy = step * if half_cycle < 4 { forward } else { -back };
         let de = StrainIncrement { xx: size, yy: -size, xy, spin: 0.0 };
         for _ in 0..parts(&shear(AMPLITUDE), step).0 {
-            advance(&sand, &mut state, &de, integrator);
+            let report = advance(&sand, &mut state, &de, integrator);
+            assert_eq!(report.near_neutral_reversals, 0, "no counter warns of such a path");
         }
     }
     state.mean_stress()

@@ -4,10 +4,11 @@
 use super::{
     PM4Sand, Parameters, State,
     rates::{Memory, Point, Reading, direction},
+    reversal,
     state::{Components, Strain},
     surfaces::stress_ratio,
 };
-use crate::{Deviator, Moduli, SoilModel, Stress};
+use crate::{Deviator, Moduli, SoilModel, Stress, UpdateReport};
 
 /// `value` rounds to the printed figure; zero is meant exactly.
 fn agrees(name: &str, value: f64, printed: &str) {
@@ -264,4 +265,65 @@ fn fabric_waits_for_the_unrotated_surface() {
         );
         assert_eq!(change.unwrap().fabric != Deviator::ZERO, grows, "{inside}");
     }
+}
+
+/// A state that has sheared forward, just before it reverses.
+fn before_reversal(sand: &PM4Sand) -> State {
+    let mut state = start(sand);
+    state.before_first_reversal = false;
+    state.alpha_in_true = traceless(-0.1, -0.1);
+    state.alpha = traceless(-0.05, 0.2);
+    state
+}
+
+fn reversed(mut state: State, trial_direction: Deviator) -> State {
+    reversal::detect(&mut state, trial_direction, &mut UpdateReport::default());
+    state
+}
+
+/// `p_zp` follows the strongest fabric times pressure, and only upwards (after the first reversal).
+#[test]
+fn pressure_of_the_strongest_fabric_is_renewed_at_a_reversal_where_both_have_grown() {
+    let sand = sand(0.55, 677.0, 0.40);
+    let back = traceless(0.0, -0.7);
+    let mut state = before_reversal(&sand);
+    state.fabric = traceless(0.3, 0.4);
+    let zp = state.fabric.norm() * state.mean;
+    for (zp_max, p_zp, renewed) in [
+        (0.9 * zp, 0.9 * state.mean, true),
+        (1.1 * zp, 0.9 * state.mean, false),
+        (0.9 * zp, 1.1 * state.mean, false),
+    ] {
+        (state.zp_max, state.p_zp) = (zp_max, p_zp);
+        let after = reversed(state, back);
+        let expected = if renewed { (zp, state.mean) } else { (zp_max, p_zp) };
+        assert_eq!((after.zp_max, after.p_zp), expected);
+        assert_eq!((after.fabric_in, after.alpha_in_true), (state.fabric, state.alpha));
+    }
+    let forward = reversed(state, -back);
+    assert_eq!(forward, state, "going on is no reversal");
+}
+
+/// A small loop keeps, component by component, the extreme that loading on leaves behind, and never one of the other
+/// sign; a loop through zero shear starts from where it turns.
+#[test]
+fn a_small_loop_keeps_the_older_origin_component_by_component() {
+    let sand = sand(0.55, 677.0, 0.40);
+    let mut state = before_reversal(&sand);
+    state.alpha_in = Components::of(traceless(-0.1, 0.1));
+    state.alpha_min = Components([-0.3, 0.02, 0.15]);
+    state.alpha_max = Components([0.1, 0.3, 0.25]);
+    // Trackers first: the component whose origin is positive renews its minimum, the others their maximum.
+    let after = reversed(state, traceless(0.1, -0.7));
+    assert_eq!(after.alpha_min, Components([-0.3, 0.02, 0.15]));
+    assert_eq!(after.alpha_max, Components([0.1, 0.3, 0.25]));
+    // Loading on with xx and against yy and xy.
+    assert_eq!(after.alpha_in, Components([0.0, 0.0, 0.0]));
+    // Loading back with yy: its minimum is positive and kept.
+    let after = reversed(state, traceless(-0.1, -0.7));
+    assert_eq!(after.alpha_in, Components([0.0, 0.02, 0.0]));
+    assert_eq!(after.alpha_in_previous, state.alpha_in);
+    // The last origin had the other sign of shear.
+    state.alpha_in = Components::of(traceless(-0.1, -0.1));
+    assert_eq!(reversed(state, traceless(-0.1, -0.7)).alpha_in, Components::of(state.alpha));
 }
