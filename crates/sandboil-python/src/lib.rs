@@ -3,6 +3,7 @@
 mod errors;
 mod laboratory;
 mod material;
+mod shear_cell;
 mod simulation;
 
 /// The extension module `sandboil._core`.
@@ -14,6 +15,8 @@ mod _core {
     use crate::laboratory::{Specimen, carries, pm4sand_constants};
     #[pymodule_export]
     use crate::material::small_strain_moduli;
+    #[pymodule_export]
+    use crate::shear_cell::ShearCell;
     #[pymodule_export]
     use crate::simulation::{Simulation, stress_node_offset};
 

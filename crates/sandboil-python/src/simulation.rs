@@ -15,7 +15,7 @@ const STEPS_PER_LOOK: u64 = 32;
 /// Times and values of history samples.
 type Histories<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>);
 
-fn get<'py, T>(dict: &Bound<'py, PyDict>, key: &str) -> PyResult<T>
+pub fn get<'py, T>(dict: &Bound<'py, PyDict>, key: &str) -> PyResult<T>
 where
     T: for<'a> FromPyObject<'a, 'py>,
     for<'a> <T as FromPyObject<'a, 'py>>::Error: Into<PyErr>,
@@ -35,7 +35,7 @@ fn vectors(rows: &PyReadonlyArray2<'_, f64>) -> Vec<solver::Vec2> {
     rows.as_array().outer_iter().map(|row| solver::Vec2::new(row[0], row[1])).collect()
 }
 
-fn numerics(dict: &Bound<'_, PyDict>) -> PyResult<solver::Numerics> {
+pub fn numerics(dict: &Bound<'_, PyDict>) -> PyResult<solver::Numerics> {
     let text = |key| get::<String>(dict, key);
     Ok(solver::Numerics {
         operators: one_of(
@@ -223,26 +223,7 @@ impl Simulation {
 
     /// Work done, by kind.
     fn counters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let counters = self.inner.counters();
-        let dict = PyDict::new(py);
-        for (name, value) in [
-            ("steps", counters.steps),
-            ("flow_calls", counters.flow_calls),
-            ("base_calls", counters.base_calls),
-            ("plastic_updates", counters.plastic_updates),
-            ("geometry_builds", counters.geometry_builds),
-            ("porosity_clips", counters.porosity_clips),
-            ("time_step_changes", counters.time_step_changes),
-            ("substeps", counters.soil.substeps),
-            ("evaluations", counters.soil.evaluations),
-            ("pressure_floors", counters.soil.pressure_floors),
-            ("forced_acceptances", counters.soil.forced_acceptances),
-            ("reversals", counters.soil.reversals),
-            ("near_neutral_reversals", counters.soil.near_neutral_reversals),
-        ] {
-            dict.set_item(name, value)?;
-        }
-        Ok(dict)
+        counted(py, &self.inner.counters())
     }
 
     fn position<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
@@ -302,7 +283,30 @@ impl Simulation {
     }
 }
 
-fn shaped<D: numpy::ndarray::Dimension>(
+/// Work done, by kind, as a dictionary.
+pub fn counted<'py>(py: Python<'py>, counters: &solver::Counters) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    for (name, value) in [
+        ("steps", counters.steps),
+        ("flow_calls", counters.flow_calls),
+        ("base_calls", counters.base_calls),
+        ("plastic_updates", counters.plastic_updates),
+        ("geometry_builds", counters.geometry_builds),
+        ("porosity_clips", counters.porosity_clips),
+        ("time_step_changes", counters.time_step_changes),
+        ("substeps", counters.soil.substeps),
+        ("evaluations", counters.soil.evaluations),
+        ("pressure_floors", counters.soil.pressure_floors),
+        ("forced_acceptances", counters.soil.forced_acceptances),
+        ("reversals", counters.soil.reversals),
+        ("near_neutral_reversals", counters.soil.near_neutral_reversals),
+    ] {
+        dict.set_item(name, value)?;
+    }
+    Ok(dict)
+}
+
+pub fn shaped<D: numpy::ndarray::Dimension>(
     values: Vec<f64>,
     shape: impl numpy::ndarray::IntoDimension<Dim = D>,
 ) -> PyResult<Array<f64, D>> {
@@ -310,11 +314,11 @@ fn shaped<D: numpy::ndarray::Dimension>(
         .map_err(|error| PyValueError::new_err(error.to_string()))
 }
 
-fn rows<'py>(py: Python<'py>, values: &[[f64; 2]]) -> Bound<'py, PyArray2<f64>> {
+pub fn rows<'py>(py: Python<'py>, values: &[[f64; 2]]) -> Bound<'py, PyArray2<f64>> {
     numpy::ndarray::arr2(values).to_pyarray(py)
 }
 
-fn pages<'py, const N: usize>(
+pub fn pages<'py, const N: usize>(
     py: Python<'py>,
     values: &[[[f64; N]; 2]],
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {

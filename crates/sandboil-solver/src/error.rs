@@ -83,3 +83,16 @@ pub enum SolverError {
         reason: String,
     },
 }
+
+impl SolverError {
+    /// The quantity that lost its meaning in a soil model under way, the node and its value; `None` of other errors.
+    pub(crate) fn soil_divergence(&self) -> Option<(&'static str, usize, f64)> {
+        match self {
+            Self::Soil { node, source: SoilError::StrainIncrementTooLarge { value, .. }, .. } => {
+                Some(("strain of a step", *node, *value))
+            }
+            Self::Soil { node, .. } => Some(("soil state", *node, f64::NAN)),
+            _ => None,
+        }
+    }
+}

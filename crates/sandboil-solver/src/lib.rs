@@ -14,6 +14,7 @@ pub mod model;
 mod parallel;
 mod phases;
 mod record;
+pub mod shear_cell;
 pub mod simulation;
 mod skeleton;
 mod soil_field;
@@ -25,6 +26,7 @@ pub use base::UpgoingWave;
 pub use error::SolverError;
 pub use model::{AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, Water, stress_node_offset};
 pub use sandboil_sph::{Period, Vec2};
+pub use shear_cell::{Sample, ShearCell, ShearTest};
 pub use simulation::{
     ACCELERATION_TERM_CONDUCTIVITY, Counters, Gravity, SHAKING_FACTOR, Shaking, Simulation,
 };

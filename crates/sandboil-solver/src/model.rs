@@ -185,14 +185,6 @@ impl Model {
                 return Err(SolverError::Shape { name, found, expected });
             }
         }
-        let positive = |name, value: f64| {
-            let allowed = value.is_finite() && value > 0.0;
-            if allowed {
-                Ok(())
-            } else {
-                Err(SolverError::InvalidInput { name, value, expected: "positive" })
-            }
-        };
         positive("nodes", nodes as f64)?;
         positive("spacing.x", self.spacing.x)?;
         positive("spacing.y", self.spacing.y)?;
@@ -228,6 +220,15 @@ impl Model {
         finite("surface_elevation", self.surface_elevation.iter().copied())?;
         finite("vertical_effective_stress", self.vertical_effective_stress.iter().copied())?;
         finite("pore_pressure", self.pore_pressure.iter().copied())
+    }
+}
+
+/// Refuses a value that is not positive and finite.
+pub(crate) fn positive(name: &'static str, value: f64) -> Result<(), SolverError> {
+    if value.is_finite() && value > 0.0 {
+        Ok(())
+    } else {
+        Err(SolverError::InvalidInput { name, value, expected: "positive" })
     }
 }
 

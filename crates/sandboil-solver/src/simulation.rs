@@ -10,15 +10,18 @@ use crate::{
     parallel::{Rows, chunks, for_each_chunk},
     phases::Phases,
     record::{Probes, Recorder},
-    skeleton::{NodalShare, PrintedStress, StressPoint, conservative_force, maximum_shear_strain, motion},
+    skeleton::{
+        NodalShare, PrintedStress, StressPoint, conservative_force, local_damping, maximum_shear_strain,
+        motion,
+    },
     soil_field::SoilField,
     timestep::{Criterion, PressureCoupling, PressureSpectrum, region_limit},
 };
-use sandboil_soil::{SoilError, Stress, UpdateReport};
+use sandboil_soil::{Stress, UpdateReport};
 use sandboil_sph::Vec2;
 
 /// Steps between checks of stability limit, geometry and finiteness.
-const CHECK_INTERVAL: u64 = 16;
+pub(crate) const CHECK_INTERVAL: u64 = 16;
 /// Time-step factor of the gravity stage: kinetic damping needs no margin for stiffening.
 const RELAXATION_FACTOR: f64 = 0.85;
 /// Default factor in shaking: soil stiffens in cycles between checks.
@@ -32,7 +35,7 @@ const IMPLICIT_GAIN: f64 = 1.2;
 /// Largest conductivity for the acceleration term of Eq. 7 when it is left to us, m/s: above, it limits dt.
 pub const ACCELERATION_TERM_CONDUCTIVITY: f64 = 3e-3;
 /// Speed no soil particle reaches, m/s: a run that does has diverged.
-const RUNAWAY_SPEED: f64 = 1e3;
+pub(crate) const RUNAWAY_SPEED: f64 = 1e3;
 /// Mean over largest unbalanced acceleration that the gravity stage asks for.
 const MEAN_RESIDUAL: f64 = 0.1;
 
@@ -260,7 +263,7 @@ impl Simulation {
             });
             self.velocity.fill(Vec2::zeros());
             self.acceleration.fill(Vec2::zeros());
-            self.soil = SoilField::plastic(&self.model, &mut self.points)?;
+            self.soil = SoilField::plastic(&self.model, &mut self.points, None)?;
         }
         self.phases.restart_strain();
         for point in &mut self.points {
@@ -589,10 +592,10 @@ impl Simulation {
 
     /// Local damping of Eq. 16 on the whole acceleration, the base's tractions included, against the velocity that
     /// each node had before it.
-    fn damp_locally(&mut self, local_damping: f64, dt: f64) {
+    fn damp_locally(&mut self, coefficient: f64, dt: f64) {
         for (v, a) in self.velocity.iter_mut().zip(&mut self.acceleration) {
             let before = *v - *a * dt;
-            let drag = a.abs().component_mul(&before.map(sign)) * -local_damping;
+            let drag = local_damping(*a, before, coefficient);
             *v += drag * dt;
             *a += drag;
         }
@@ -609,14 +612,9 @@ impl Simulation {
             (filter, dt),
             &self.model.numerics.integrator,
         );
-        let report = report.map_err(|error| match error {
-            SolverError::Soil { node, source, .. } => match source {
-                SoilError::StrainIncrementTooLarge { value, .. } => {
-                    self.diverged("strain of a step", node, value)
-                }
-                _ => self.diverged("soil state", node, f64::NAN),
-            },
-            other => other,
+        let report = report.map_err(|error| match error.soil_divergence() {
+            Some((quantity, node, value)) => self.diverged(quantity, node, value),
+            None => error,
         })?;
         self.counters.soil.merge(&report);
         self.counters.plastic_updates += self.soil.plastic_points() as u64;
@@ -717,7 +715,7 @@ impl Simulation {
             return Err(self.diverged("pore pressure", j, value));
         }
         let (target, criterion) = self.limit(shaking.coupling, shaking.stage.time_step_factor);
-        if self.dt > SHRINK_AT * target || self.dt * GROW_AT < target {
+        if step_is_outgrown(self.dt, target) {
             (self.dt, self.criterion) = (target, criterion);
             self.counters.time_step_changes += 1;
         }
@@ -976,6 +974,11 @@ impl Simulation {
     }
 }
 
+/// Whether a time step is too far from its target to be kept.
+pub(crate) fn step_is_outgrown(dt: f64, target: f64) -> bool {
+    dt > SHRINK_AT * target || dt * GROW_AT < target
+}
+
 /// History channels of one probe. Stress is effective, tension positive.
 fn channel_names(water: bool, stress: bool) -> Vec<&'static str> {
     let mut names = vec![
@@ -993,11 +996,6 @@ fn channel_names(water: bool, stress: bool) -> Vec<&'static str> {
         names.extend(["stress_xx", "stress_yy", "stress_xy", "strain_xx", "strain_yy", "gamma_xy"]);
     }
     names
-}
-
-/// Sign with zero for zero: a node at rest is not pushed by its damping.
-fn sign(value: f64) -> f64 {
-    if value == 0.0 { 0.0 } else { value.signum() }
 }
 
 /// The model with nodes sorted by region, then by row and column of the lattice, and the user's index of each:

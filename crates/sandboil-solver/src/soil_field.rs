@@ -166,15 +166,20 @@ impl SoilField {
         })
     }
 
-    /// Shaking: every region's own model, its state made from the stress that is there.
+    /// Dynamics: every region's own model, its state made from the stress that is there and a void ratio common to
+    /// all, or the model's own.
     ///
     /// # Errors
     /// [`SolverError::Soil`] where a model refuses the stress.
-    pub fn plastic(model: &Model, points: &mut [StressPoint]) -> Result<Self, SolverError> {
+    pub fn plastic(
+        model: &Model,
+        points: &mut [StressPoint],
+        void_ratio: Option<f64>,
+    ) -> Result<Self, SolverError> {
         Self::build(model, |region, rows| {
             let soil = &model.regions[region].soil;
             let Soil::Elastic(elastic) = soil else {
-                return with_model!(soil, law => Ok(Law::Plastic(plastic_rows(law, region, rows, points)?)));
+                return with_model!(soil, law => Ok(Law::Plastic(plastic_rows(law, region, rows, points, void_ratio)?)));
             };
             for point in &mut points[rows] {
                 set_moduli(point, elastic.constants());
@@ -270,10 +275,11 @@ fn plastic_rows<M: SoilModel + 'static>(
     region: usize,
     rows: Range<usize>,
     points: &mut [StressPoint],
+    void_ratio: Option<f64>,
 ) -> Result<Box<dyn Plastic>, SolverError> {
     let mut states = Vec::with_capacity(rows.len());
     for s in rows {
-        let state = law.initialise(points[s].stress, None).map_err(|source| SolverError::Soil {
+        let state = law.initialise(points[s].stress, void_ratio).map_err(|source| SolverError::Soil {
             region,
             node: s / STRESS_NODES,
             source,

@@ -4,5 +4,6 @@
 
 mod common;
 mod consolidation;
+mod shear_cell;
 mod stages;
 mod wave_column;
