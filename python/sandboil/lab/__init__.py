@@ -7,6 +7,7 @@ engineering. `docs/laboratory.md` tells what each test does.
 
 from . import correlations
 from ._calibration import Calibration, CalibrationWarning, calibrate_hpo, calibration
+from ._cell import CellReport, ShearCell, shear_cell
 from ._modulus import modulus_reduction
 from ._paths import plane_strain_compression, reconsolidation, strain_path, stress_path
 from ._resistance import FactorCurve, ResistanceCurve, crr, crr_curve, k_alpha, k_sigma
@@ -17,6 +18,7 @@ from ._specimen import SoilModel
 __all__ = [
     "Calibration",
     "CalibrationWarning",
+    "CellReport",
     "CompressionTest",
     "CyclicTest",
     "FactorCurve",
@@ -24,6 +26,7 @@ __all__ = [
     "PathTest",
     "Reconsolidation",
     "ResistanceCurve",
+    "ShearCell",
     "ShearTest",
     "SoilModel",
     "calibrate_hpo",
@@ -38,6 +41,7 @@ __all__ = [
     "monotonic_dss",
     "plane_strain_compression",
     "reconsolidation",
+    "shear_cell",
     "strain_path",
     "stress_path",
 ]
