@@ -102,7 +102,7 @@ def _draw(results: dict[str, ShearCell]) -> None:
         column[1].set_xlabel("shear strain, %")
     for axis in axes[:, 0]:
         axis.set_ylabel("shear stress, kPa")
-    axes[0, 0].legend(frameon=False, loc="upper left", fontsize="small")
+    axes[1, 0].legend(frameon=False, loc="lower right", fontsize="small")
     PICTURE.parent.mkdir(exist_ok=True)
     figure.savefig(PICTURE, dpi=110)
     plt.close(figure)

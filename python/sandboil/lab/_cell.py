@@ -59,7 +59,7 @@ class CellReport:
     volume_strain : root mean square of the volumetric strain over the centre; zero if exactly undrained
     velocity_deviation : root mean square departure of the free nodes from Eq. 17, over the largest speed of
         the centre's edge
-    overshoot : largest stress beyond the target, over the target
+    overshoot : largest stress beyond the target, over the target; negative if it was never reached
     counters : work done, by kind
     """
 
