@@ -60,6 +60,30 @@ fn out_of_plane_stress_keeps_its_distance_to_the_mean_at_constant_volume() {
     }
 }
 
+/// What a part compresses beyond the closing of the gap builds up stress, and no more than that.
+#[test]
+fn a_part_that_closes_the_gap_compresses_the_soil_by_the_rest() {
+    let sand = sand_with(MEDIUM, Options { gap_memory: true, ..Options::default() });
+    let volume = |change: f64| strain_of(0.5 * change, 0.5 * change, 0.0);
+    let mut state = consolidated(&sand);
+    let compress = |state: &mut State, change: f64| {
+        advance(&sand, state, &volume(-change), &Integrator::default());
+    };
+    compress(&mut state, -3e-3);
+    let all_but = state.gap_strain() - 2e-6;
+    assert!(all_but > 0.0, "the expansion did not reach the floor");
+    compress(&mut state, all_but);
+    let floor = state.mean_stress();
+    let mut at_once = state;
+    compress(&mut at_once, 4e-6);
+    let rest = state.gap_strain();
+    compress(&mut state, rest);
+    assert_eq!((state.gap_strain(), state.mean_stress()), (0.0, floor));
+    compress(&mut state, 4e-6 - rest);
+    let (whole, parts) = (at_once.mean_stress(), state.mean_stress());
+    assert!(whole > 1.01 * floor && (whole / parts - 1.0).abs() < 1e-9, "{whole} {parts}");
+}
+
 /// Exponents of increments that stay clear of the bounding surface. On it a turning direction meets the infinite
 /// hardening of the image point, and round-off decides where a sub-step ends (`docs/theory/pm4sand.md`).
 const GENTLE: std::ops::Range<f64> = -6.0..-4.5;

@@ -327,3 +327,62 @@ fn a_small_loop_keeps_the_older_origin_component_by_component() {
     state.alpha_in = Components::of(traceless(-0.1, -0.1));
     assert_eq!(reversed(state, traceless(-0.1, -0.7)).alpha_in, Components::of(state.alpha));
 }
+
+/// Loose of critical the bounding surface moves a quarter and the dilatancy surface four times as fast.
+#[test]
+fn surfaces_of_sand_loose_of_critical() {
+    let sand = sand(0.15, 320.0, 0.5);
+    let c = sand.parameters();
+    let surfaces = sand.surfaces(101.3, c.initial_void_ratio());
+    let state_index = 1.5 / (10.0 - 100.0_f64.ln()) - 0.15;
+    assert!((surfaces.state_index - state_index).abs() < 1e-12 && state_index > 0.0);
+    let ratio = |exponent: f64| c.critical_ratio * (exponent * state_index).exp();
+    assert!((surfaces.bounding - ratio(-0.125)).abs() < 1e-12);
+    assert!((surfaces.dilatancy - ratio(0.4)).abs() < 1e-12);
+    assert_eq!(start(&sand).dilatancy_scale, 1.24);
+}
+
+/// Where the formulas of the defaults leave their range.
+#[test]
+fn limits_of_the_defaults() {
+    assert_eq!(sand(0.05, 270.0, 0.5).parameters().c_dr, 5.0);
+    assert_eq!(sand(0.05, 270.0, 0.5).parameters().c_kaf, 4.0);
+    let densest = sand(1.0, 1160.0, 0.5);
+    assert_eq!((densest.parameters().c_kaf, start(&densest).fabric_limit), (35.0, 20.0));
+    let steep = Parameters { dr: 1.0, g0: 1160.0, hpo: 0.5, nb: Some(1.0), ..Parameters::default() };
+    let steep = PM4Sand::new(steep, super::Options::default()).unwrap();
+    assert!(steep.surfaces_of(&start(&steep)).bounding > 2.0);
+    assert_eq!(start(&steep).dilatancy_scale, 1.5);
+}
+
+/// Beyond the bounding surface the stress ratio takes no more than half of the stiffness.
+#[test]
+fn stress_ratio_takes_at_most_half_of_the_stiffness() {
+    let sand = sand(0.55, 677.0, 0.40);
+    let shear = |ratio: f64| {
+        let s = traceless(0.0, 0.5 * ratio * 100.0);
+        sand.elastic_moduli(100.0, s, 0.5, 1.2, 1.0).shear
+    };
+    assert!((shear(1.2) / shear(0.0) - 0.5).abs() < 1e-12);
+    assert_eq!(shear(1.2), shear(1.5));
+}
+
+/// Inside a long step fabric may outgrow its peak of the last commit: it then spares dilation the loss of the strain
+/// rate factor, and does not turn it into a gain.
+#[test]
+fn fabric_beyond_its_peak_leaves_dilation_undamaged() {
+    let dilatancy = |ce: f64| {
+        let given = Parameters { dr: 0.55, g0: 677.0, hpo: 0.4, ce: Some(ce), ..Parameters::default() };
+        let sand = PM4Sand::new(given, super::Options::default()).unwrap();
+        let mut state = start(&sand);
+        let n = traceless(0.0, std::f64::consts::FRAC_1_SQRT_2);
+        (state.fabric, state.fabric_in) = (n * -4.0, n * -1.0);
+        (state.fabric_cumulative, state.fabric_peak, state.p_zp) = (14.0, 1.5, 50.0);
+        let surfaces = sand.surfaces(20.0, state.void_ratio_at(state.volumetric_strain));
+        let alpha = n * ((surfaces.dilatancy + 0.05) / std::f64::consts::SQRT_2);
+        let at = Point { p: 20.0, s: alpha * 20.0, out_of_plane: 20.0, alpha, fabric: state.fabric };
+        sand.flow(n, &at, &Memory::of(&sand, &state), surfaces, 1.0e4, true).dilatancy
+    };
+    assert!(dilatancy(0.5) < 0.0);
+    assert_eq!(dilatancy(0.5), dilatancy(0.0));
+}
