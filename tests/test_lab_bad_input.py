@@ -49,8 +49,8 @@ CYCLIC: list[tuple[str, dict[str, Any], str]] = [
     ("void_ratio", {"csr": 0.1, "void_ratio": 0.0}, "must be greater than 0"),
     ("gamma_stop", {"csr": 0.1, "gamma_stop": 0.0}, r"must lie in \(0, 1\]"),
     ("gamma_stop", {"csr": 0.1, "gamma_stop": 5.0}, "5 % is written 0.05"),
-    ("max_cycles", {"csr": 0.1, "max_cycles": 0}, "must be at least 1"),
-    ("max_cycles", {"csr": 0.1, "max_cycles": 2.5}, "integer"),
+    ("max_cycles", {"csr": 0.1, "max_cycles": 0}, r"must lie in \[1, 1e\+07\]"),
+    ("max_cycles", {"csr": 0.1, "max_cycles": 2.5}, "whole number"),
     ("drained", {"csr": 0.1, "drained": "no"}, "boolean"),
     ("integrator", {"csr": 0.1, "integrator": "rk44"}, "'default', 'rk4', 'reference'; did you mean 'rk4'"),
     ("tolerance", {"csr": 0.1, "tolerance": 0.1}, r"must lie in \(0, 0.0001\]"),
@@ -107,7 +107,7 @@ OTHERS: list[tuple[Callable[..., object], str, dict[str, Any], str]] = [
     (lab.plane_strain_compression, "axial_strain_max", {"axial_strain_max": 1.0}, r"must lie in \(0, 1\)"),
     (lab.plane_strain_compression, "K0", {"K0": 30.0}, "must lie in"),
     (lab.modulus_reduction, "strains", {"strains": [0.0, 1e-3]}, r"must lie in \(0, 1\]"),
-    (lab.modulus_reduction, "cycles", {"cycles": 0}, "must be at least 1"),
+    (lab.modulus_reduction, "cycles", {"cycles": 0}, r"must lie in \[1, 1e\+07\]"),
     (lab.modulus_reduction, "strain", {"strain": [1e-3]}, "did you mean 'strains'"),
 ]
 
@@ -119,6 +119,52 @@ def test_a_slip_in_another_test_is_refused(
     told = refusal(test, **arguments)
     assert told.path == f"lab.{test.__name__}.{name}"
     assert re.search(allowed, f"{told.allowed}; {told.hint}"), str(told)
+
+
+LATERAL = sb.TotalStress(Su=30.0, G=1e4, K=1e5)
+FRICTION = {"phi": 30.0, "G": 5e4, "K": 1e5}
+
+
+@pytest.mark.parametrize(
+    ("soil", "name", "arguments", "allowed"),
+    [
+        # (1 - K0)/2 sigma_v0 is Su; Rankine's coefficients; shear alone on the cone.
+        (LATERAL, "K0", {"K0": 0.05}, [1.0 - 60.0 / 101.3, 1.0 + 60.0 / 101.3]),
+        (sb.MohrCoulomb(c=0.0, **FRICTION), "K0", {"K0": 0.1}, [1.0 / 3.0, 3.0]),
+        (
+            sb.DruckerPrager(c=0.0, psi=30.0, **FRICTION),
+            "static_shear_ratio",
+            {"static_shear_ratio": 0.9, "K0": 1.0},
+            [-0.4804, 0.4804],  # 3 tan(phi)/sqrt(9 + 12 tan^2(phi))
+        ),
+    ],
+)
+def test_a_start_beyond_the_strength_of_any_soil_is_refused(
+    soil: object, name: str, arguments: dict[str, float], allowed: list[float]
+) -> None:
+    """The core would replace it by a stress inside, and the test would not be the one that was asked for."""
+    with pytest.raises(InvalidInput) as told:
+        lab.monotonic_dss(soil, gamma_max=0.01, **arguments)
+    assert told.value.path == f"lab.monotonic_dss.{name}"
+    range_told = [float(end) for end in re.findall(r"-?\d+\.\d+", told.value.allowed)[:2]]
+    assert range_told == pytest.approx(allowed, abs=1e-3)
+
+
+def test_a_first_stress_beyond_the_strength_is_told_with_the_share_that_is_carried() -> None:
+    soil = sb.MohrCoulomb(c=0.0, **FRICTION)
+    with pytest.raises(InvalidInput, match=r"must be 0\.\d+ times that far from isotropic") as told:
+        lab.strain_path(soil, stress0=(-1.0, -100.0, 0.0), strain=[(0.0, 0.0, 1e-3)])
+    share = float(re.findall(r"0\.\d+", told.value.allowed)[0])
+    # sin(phi) of the circle with the centre 50.5 and the radius 49.5.
+    assert share == pytest.approx(0.5 * 50.5 / 49.5, abs=2e-3)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    test = lab.cyclic_dss(SAND, csr=np.float32(0.1), max_cycles=np.int64(1), sigma_v0=np.array(100.0))
+    assert test.turns[-1] == 2
+    for name, wrong in (("csr", np.array([0.1])), ("max_cycles", 10**20), ("max_cycles", True)):
+        told = refusal(lab.cyclic_dss, **({"csr": 0.1} | {name: wrong}))
+        assert told.path == f"lab.cyclic_dss.{name}"
 
 
 def test_only_a_test_with_its_specimen_goes_on() -> None:

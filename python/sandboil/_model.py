@@ -13,11 +13,15 @@ from pydantic_core import ErrorDetails
 from ._errors import InvalidInput, nearest_name
 
 
-def _as_float(value: object) -> float:
+def as_float(value: object) -> float:
     """Take any real number (numpy's too), but no text and no truth value: those are slips."""
     if isinstance(value, (bool, str, bytes)) or not hasattr(value, "__float__"):
         raise ValueError("must be a number")
-    return float(value)
+    try:
+        return float(value)
+    except (TypeError, OverflowError):
+        # An array of several numbers, or an integer beyond all floats.
+        raise ValueError("must be a number") from None
 
 
 def _as_list(value: object) -> object:
@@ -25,7 +29,7 @@ def _as_list(value: object) -> object:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-Number = Annotated[float, BeforeValidator(_as_float)]
+Number = Annotated[float, BeforeValidator(as_float)]
 
 _Item = typing.TypeVar("_Item")
 Many = Annotated[Sequence[_Item], BeforeValidator(_as_list), AfterValidator(tuple)]

@@ -138,6 +138,11 @@ impl DruckerPrager {
         Ok(Self { elastic, peak, residual, softening_strain, largest_invariant })
     }
 
+    /// Largest first invariant before softening, kPa: that of the apex or of the cut-off.
+    fn peak_invariant(&self) -> f64 {
+        self.largest_invariant.min(self.peak.apex())
+    }
+
     fn cone(&self, plastic_shear: f64) -> Cone {
         self.peak.between(&self.residual, (plastic_shear / self.softening_strain).min(1.0))
     }
@@ -211,10 +216,12 @@ impl SoilModel for DruckerPrager {
 
     /// A stress outside keeps its mean, or the largest one admitted, and loses the shear that is too much.
     fn initialise(&self, stress: Stress, _void_ratio: Option<f64>) -> Result<State, SoilError> {
-        let first_invariant = stress.first_invariant().min(self.largest_invariant).min(self.peak.apex());
-        let admissible = self.peak.size_at(first_invariant).max(0.0);
-        let inside = stress.first_invariant() <= first_invariant && stress.root_j2() <= admissible;
-        let stress = if inside { stress } else { reduced(&stress, first_invariant, admissible) };
+        let stress = if self.carries(&stress) {
+            stress
+        } else {
+            let first_invariant = stress.first_invariant().min(self.peak_invariant());
+            reduced(&stress, first_invariant, self.peak.size_at(first_invariant).max(0.0))
+        };
         Ok(State { stress: stress.finite("initial stress")?, plastic_shear: 0.0 })
     }
 
@@ -247,6 +254,11 @@ impl SoilModel for DruckerPrager {
 
     fn plastic_shear_strain(&self, state: &State) -> Option<f64> {
         Some(state.plastic_shear)
+    }
+
+    fn carries(&self, stress: &Stress) -> bool {
+        let first_invariant = stress.first_invariant();
+        first_invariant <= self.peak_invariant() && stress.root_j2() <= self.peak.size_at(first_invariant)
     }
 }
 

@@ -157,4 +157,8 @@ impl SoilModel for MohrCoulomb {
     fn static_shear_modulus(&self) -> f64 {
         self.elastic.constants().shear
     }
+
+    fn carries(&self, stress: &Stress) -> bool {
+        self.returned(stress, 0.0) == *stress
+    }
 }

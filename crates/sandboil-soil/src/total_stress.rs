@@ -192,6 +192,10 @@ impl SoilModel for TotalStress {
     fn plastic_shear_strain(&self, state: &State) -> Option<f64> {
         Some(state.plastic_shear)
     }
+
+    fn carries(&self, stress: &Stress) -> bool {
+        self.size(stress) <= self.peak
+    }
 }
 
 #[cfg(test)]

@@ -315,6 +315,17 @@ fn refuses<M: SoilModel>(model: &M) {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(256) })]
 
+    /// Whoever asks first is told of every start that would be replaced.
+    #[test]
+    fn a_stress_is_carried_where_a_state_at_rest_keeps_it(stress in any_stress()) {
+        for Case { soil, .. } in cases() {
+            with_model!(&soil, model => {
+                let kept = model.stress(&model.initialise(stress, None).unwrap()) == stress;
+                prop_assert_eq!(model.carries(&stress), kept, "{:?}", model);
+            });
+        }
+    }
+
     #[test]
     fn no_path_leaves_the_surface(
         start in any_stress(),

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import functools
 import inspect
+import operator
 import typing
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field, PlainValidator, create_model
+from pydantic import BeforeValidator, Field, PlainValidator, create_model
 
 from .._model import Model, Number
 from ..discretise import Floats
@@ -24,6 +25,8 @@ _R = TypeVar("_R")
 _TOLERANCE_MAX = 1.0e-4
 # Largest shear or axial strain of a test: beyond it an element is no element any more.
 _STRAIN_MAX = 1.0
+# Largest number of cycles: a test of more would take days.
+_COUNT_MAX = 10**7
 
 
 def _finite(value: object, dimensions: int, shape: str) -> Floats:
@@ -36,6 +39,16 @@ def _finite(value: object, dimensions: int, shape: str) -> Floats:
     if not np.isfinite(array).all():
         raise ValueError("must be finite throughout")
     return array
+
+
+def _as_integer(value: object) -> int:
+    """Take any integer (numpy's too), but no truth value: that is a slip."""
+    try:
+        if isinstance(value, (bool, np.bool_)):
+            raise TypeError
+        return operator.index(typing.cast(Any, value))
+    except TypeError:
+        raise ValueError("must be a whole number") from None
 
 
 def _as_series(value: object) -> Floats:
@@ -109,7 +122,7 @@ Limit = Annotated[
     ),
 ]
 AxialStrain = Annotated[Number, Field(gt=0.0, lt=_STRAIN_MAX, description="compression, 1")]
-Count = Annotated[int, Field(strict=True, ge=1)]
+Count = Annotated[int, BeforeValidator(_as_integer), Field(ge=1, le=_COUNT_MAX)]
 Integrator = Literal["default", "rk4", "reference"]
 Tolerance = (
     Annotated[Number, Field(gt=0.0, le=_TOLERANCE_MAX, description="of the default integrator, relative")]

@@ -148,7 +148,8 @@ def under_stress(
     mean = 0.5 * (xx + yy)
 
     def carried(share: float) -> bool:
-        return carries(soil, (mean + share * (xx - mean), mean + share * (yy - mean), share * xy, zz))
+        xx_share, yy_share, zz_share = (mean + share * (normal - mean) for normal in (xx, yy, zz))
+        return carries(soil, (xx_share, yy_share, share * xy, zz_share))
 
     if not carried(1.0):
         path, shown = f"{where}.stress0", tuple(given.tolist())
