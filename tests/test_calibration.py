@@ -1,6 +1,7 @@
 """Cyclic resistance, its curves and factors, and calibration to it."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -118,6 +119,32 @@ def test_sand_from_field_tests():
     assert lab.crr(deep, sigma_v0=400.0) == pytest.approx(wanted, rel=5e-3)
 
 
+def test_a_resistance_beside_jumps_of_the_count_is_met():
+    """Counts go up and down by a half within a per cent of this stress ratio."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result = lab.calibration(0.6, 678.357, 0.147901)
+    assert result.met
+    assert result.achieved == pytest.approx(0.147901, rel=0.01)
+
+
+def test_sand_denser_than_the_triggering_curve_takes_a_resistance_that_is_given():
+    assert correlations.estimates(N160cs=40.0, crr=0.8)["crr"] == 0.8
+    assert correlations.crr_from_spt(37.5) == pytest.approx(2.0, rel=0.01)
+
+
+def test_a_misspelt_parameter_of_the_sand_is_told_with_the_right_one():
+    with pytest.raises(sb.InvalidInput, match="did you mean 'z_max'"):
+        lab.calibrate_hpo(0.55, 677.0, 0.147, zmax=3.0)
+
+
+def test_a_target_beyond_the_strength_is_out_of_reach_too():
+    """Critical-state strength allows 7.8: such a stroke goes on without end."""
+    with pytest.warns(lab.CalibrationWarning, match="cannot be met by any contraction rate"):
+        result = lab.calibration(0.55, 677.0, 14.7, cycles=5)
+    assert not result.met
+
+
 def test_a_target_out_of_reach_is_warned_of():
     with pytest.warns(lab.CalibrationWarning, match="cannot be met") as told:
         result = lab.calibration(0.55, 677.0, 1.4)
@@ -131,7 +158,10 @@ def test_a_target_out_of_reach_is_warned_of():
     [
         (lambda: lab.calibrate_hpo(0.55, 677.0, 0.147, cyles=15), "lab.calibration.cyles"),
         (lambda: lab.calibrate_hpo(0.55, 677.0, -0.1), "lab.calibration.crr"),
-        (lambda: lab.calibrate_hpo(0.55, 677.0, 0.147, cycles=0), "lab.calibration.cycles"),
+        (lambda: lab.calibrate_hpo(0.55, 677.0, 0.147, cycles=0.5), "lab.calibration.cycles"),
+        (lambda: lab.calibrate_hpo(0.55, 677.0, 0.147, cycles=1e9), "lab.calibration.cycles"),
+        (lambda: lab.calibrate_hpo(0.55, 677.0, 0.147, hpo=0.4), "lab.calibration.hpo"),
+        (lambda: lab.calibrate_hpo(0.55, 677.0, 0.147, secondary={}), "lab.calibration.secondary"),
         (lambda: lab.calibrate_hpo(55.0, 677.0, 0.147), "material.Dr"),
         (lambda: lab.calibrate_hpo(0.55, 677.0, 0.147, K0=9.0), "lab.cyclic_dss.K0"),
         (lambda: lab.crr(sand(TABLE_1[0]), gamma_sa=0.03, r_u=0.9), "lab.criterion"),
@@ -139,7 +169,15 @@ def test_a_target_out_of_reach_is_warned_of():
         (lambda: lab.crr_curve(sand(TABLE_1[0]), csr=[]), "lab.crr_curve.csr"),
         (lambda: lab.k_alpha(sand(TABLE_1[0]), (0.5,)), "correlations.static_shear_ratio"),
         (lambda: lab.k_sigma(sb.Elastic(G=1e4, K=2e4)), "lab.k_sigma.soil"),
-        (lambda: correlations.crr_from_spt(60.0), "correlations.N160cs"),
+        (lambda: correlations.crr_from_spt(38.0), "correlations.N160cs"),
+        (lambda: correlations.crr_from_spt("14"), "correlations.N160cs"),
+        (lambda: correlations.crr_from_cpt(np.array([90.0, 100.0])), "correlations.qc1Ncs"),
+        (lambda: correlations.crr_from_cpt(212.0), "correlations.qc1Ncs"),
+        (lambda: correlations.k_sigma(2500.0, N160cs=14), "correlations.sigma_v0"),
+        (lambda: correlations.k_alpha(math.nan, Dr=0.5, sigma_v0=100.0), "correlations.static_shear_ratio"),
+        (lambda: correlations.k_alpha(0.1, Dr=50, sigma_v0=100.0), "correlations.Dr"),
+        (lambda: sb.PM4Sand.from_density(55.0), "correlations.Dr"),
+        (lambda: sb.PM4Sand.from_spt(40.0), "correlations.N160cs"),
         (lambda: correlations.relative_density_from_cpt(5.0), "correlations.qc1Ncs"),
         (lambda: correlations.k_sigma(100.0), "correlations.k_sigma"),
         (lambda: correlations.estimates(Dr=0.5, N160cs=10.0), "correlations.estimates"),

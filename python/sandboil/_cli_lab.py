@@ -184,7 +184,7 @@ def calibrate(
     """Find PM4Sand's contraction rate for a cyclic resistance; prints the material as TOML."""
     estimated: dict[str, float] = {}
     if spt is not None or cpt is not None:
-        estimated = lab.correlations.estimates(N160cs=spt, qc1Ncs=cpt, sigma_v0=sigma_v0)
+        estimated = lab.correlations.estimates(N160cs=spt, qc1Ncs=cpt, sigma_v0=sigma_v0, crr=crr)
     given = {name: value for name, value in {"Dr": Dr, "G0": G0, "crr": crr}.items() if value is not None}
     asked: dict[str, Any] = estimated | given
     for name in ("Dr", "G0", "crr"):

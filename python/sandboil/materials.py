@@ -126,8 +126,8 @@ class PM4Sand(Model):
         # The laboratory tests materials, so it cannot be there before them.
         from .lab import calibrate_hpo, correlations
 
-        overburden = {name: options[name] for name in ("sigma_v0",) if name in options}
-        return calibrate_hpo(**(correlations.estimates(**measured, **overburden) | options))
+        said = {name: options[name] for name in ("sigma_v0", "crr") if name in options}
+        return calibrate_hpo(**(correlations.estimates(**measured, **said) | options))
 
     @model_validator(mode="after")
     def _void_ratios_ordered(self) -> PM4Sand:

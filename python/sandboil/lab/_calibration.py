@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import warnings
 from dataclasses import dataclass, field
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
+from .._errors import InvalidInput, nearest_name
 from .._model import Number
 from ..materials import PM4Sand
 from . import correlations
@@ -21,9 +23,9 @@ from ._resistance import (
     bisect,
     bracket,
     criterion_of,
-    crr,
     crr_curve,
     falls_short,
+    resistance,
 )
 
 if TYPE_CHECKING:
@@ -35,8 +37,11 @@ Target = Annotated[Number, Field(gt=0.0, description="cyclic resistance ratio")]
 _HPO_RANGE = (1e-3, 50.0)
 # Factor by which the first guess is moved until it brackets the answer; the guess is good to 1.5.
 _BRACKETING = 1.5
-# Resistances are met to this, relatively, or the user is warned.
-_MET = 5e-3
+# Resistances are met to this, relatively, or the user is warned. A count by halves is no smooth function of
+# the stress ratio: it goes up and down by a half within a per cent.
+_MET = 0.01
+# Steps in which the resistance of the answer is looked for beside the target, relatively.
+_STEP = 0.0025
 
 
 class CalibrationWarning(UserWarning):
@@ -93,7 +98,21 @@ def calibration(Dr: float, G0: float, crr: float, **options: Any) -> Calibration
     Warns with :class:`CalibrationWarning`, and returns the nearest sand, where no contraction rate meets the
     target. Raises :class:`InvalidInput`.
     """
-    secondary = {name: options.pop(name) for name in PM4Sand.model_fields if name in options}
+    unknown = options.keys() - _OPTIONS - PM4Sand.model_fields.keys()
+    if unknown or "hpo" in options:
+        name = "hpo" if "hpo" in options else sorted(unknown)[0]
+        known = sorted(_OPTIONS) + [name for name in PM4Sand.model_fields if name not in _FOUND]
+        nearest = nearest_name(name, known)
+        raise InvalidInput(
+            f"lab.calibration.{name}",
+            options[name],
+            "is what the calibration finds"
+            if name == "hpo"
+            else f"unknown key, known are {', '.join(known)}",
+            None if name == "hpo" or nearest is None else f"did you mean {nearest!r}?",
+        )
+    secondary = {name: value for name, value in options.items() if name not in _OPTIONS}
+    options = {name: value for name, value in options.items() if name in _OPTIONS}
     return _calibrated(Dr, G0, crr, secondary=secondary, **options)
 
 
@@ -130,16 +149,21 @@ def _calibrate(
     found = bracket(resists, _first_guess(Dr, crr), _BRACKETING, _HPO_RANGE)
     if found is not None:
         soil = sand(bisect(resists, *found))
+        achieved = resistance(soil, cycles, criterion, conditions, guess=crr, step=1.0 + _STEP)
     else:
         soil = sand(_HPO_RANGE[0] if resists(_HPO_RANGE[0]) else _HPO_RANGE[1])
-    achieved = _resistance(soil, crr, found is not None, cycles, criterion, conditions)
+        achieved = resistance(soil, cycles, criterion, conditions)
     result = Calibration(soil, crr, achieved, cycles, criterion, conditions)
     if not result.met:
         reached = "no resistance at all" if math.isnan(achieved) else f"{achieved:.4g}"
+        reason = (
+            f"cannot be met by any contraction rate between {_HPO_RANGE[0]:g} and {_HPO_RANGE[1]:g}"
+            if found is None
+            else f"is not met within {100.0 * _MET:g} %, since resistance jumps with the contraction rate"
+        )
         warnings.warn(
-            f"crr = {crr:g} in {cycles:g} cycles cannot be met by any contraction rate between "
-            f"{_HPO_RANGE[0]:g} and {_HPO_RANGE[1]:g} at Dr = {Dr:g}, G0 = {G0:g}: hpo = {soil.hpo:g} gives "
-            f"{reached}",
+            f"crr = {crr:g} in {cycles:g} cycles {reason} at Dr = {Dr:g}, G0 = {G0:g}: hpo = {soil.hpo:g} "
+            f"gives {reached}",
             CalibrationWarning,
             # The frames between here and the caller of `calibration`.
             stacklevel=4,
@@ -147,25 +171,12 @@ def _calibrate(
     return result
 
 
-def _resistance(
-    soil: PM4Sand,
-    target: float,
-    bracketed: bool,
-    cycles: float,
-    criterion: dict[str, float],
-    conditions: Conditions,
-) -> float:
-    """Resistance of the calibrated sand. Where the target was bracketed it is enough to look beside it."""
-
-    def weaker(csr: float) -> bool:
-        return falls_short(soil, csr, cycles, criterion, conditions)
-
-    low, high = target * (1.0 - _MET), target * (1.0 + _MET)
-    if bracketed and weaker(high) and not weaker(low):
-        return target
-    arguments: dict[str, Any] = {**criterion, **conditions.arguments()}
-    return crr(soil, cycles=cycles, **arguments)
-
-
 _calibrate.__name__ = "calibration"
 _calibrated = checked(_calibrate)
+# Keywords of `calibration` that are no parameters of the sand, and parameters that are no keywords of it.
+_OPTIONS = {
+    name
+    for name, parameter in inspect.signature(_calibrate).parameters.items()
+    if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+} - {"secondary"}
+_FOUND = ("kind", "Dr", "G0", "hpo")

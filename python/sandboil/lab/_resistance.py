@@ -44,7 +44,7 @@ CRITERIA: dict[str, dict[str, float]] = {
 _CSR_RANGE = (0.005, 3.0)
 # First guess and the factor by which it is moved until it brackets the answer.
 _CSR_GUESS, _BRACKETING = 0.15, 1.4
-# Relative width at which a bisection ends: a tenth of a per cent is far below what resistances are known to.
+# Relative width at which a bisection ends: far below what resistances are known to.
 _WIDTH = 2e-4
 # Strain at which a test for a pore pressure ratio or a double amplitude ends: liquefied sand has come so far.
 _GAMMA_STOP = 0.06
@@ -54,9 +54,11 @@ _FIRST_STROKE = 0.25
 _CURVE_FRACTIONS = (0.75, 0.82, 0.9, 1.0, 1.1, 1.25, 1.45, 1.7)
 # Cycles at which a point of a curve is given up.
 _CURVE_CYCLES = 500
+# Largest number of cycles of a resistance: no ground is shaken so long.
+_CYCLES_MAX = 1e4
 
 
-Cycles = Annotated[Number, Field(gt=0.0, description="uniform cycles")]
+Cycles = Annotated[Number, Field(gt=0.5, le=_CYCLES_MAX, description="uniform cycles")]
 PressureRatio = Annotated[Number, Field(gt=0.0, le=1.0, description="excess pore pressure ratio, 1")]
 
 
@@ -99,17 +101,23 @@ def falls_short(
     strokes = np.where(np.arange(survived) % 2 == 0, csr, -csr)
     if survived == 0:
         return False
-    test = cyclic_dss(
-        soil,
-        reversals=conditions.static_shear_ratio + strokes,
-        gamma_stop=_stop_strain(criterion),
-        **conditions.arguments(),
-    )
+    try:
+        test = cyclic_dss(
+            soil,
+            reversals=conditions.static_shear_ratio + strokes,
+            gamma_stop=_stop_strain(criterion),
+            **conditions.arguments(),
+        )
+    except InvalidInput as refusal:
+        if refusal.path != "lab.cyclic_dss.reversals":
+            raise
+        # More than the strength: the first stroke goes on without end.
+        return True
     return not math.isnan(test.cycles_to(**criterion))
 
 
 def bisect(condition: Callable[[float], bool], low: float, high: float) -> float:
-    """Where a monotonic condition turns true between `low` (false) and `high` (true); both positive."""
+    """Where a condition turns true between `low` (false) and `high` (true); both positive."""
     while high / low > 1.0 + _WIDTH:
         middle = math.sqrt(low * high)
         if condition(middle):
@@ -163,11 +171,23 @@ def crr(
     """
     criterion = criterion_of(gamma_sa, gamma_da, r_u)
     conditions = Conditions(sigma_v0, K0, static_shear_ratio, void_ratio, integrator)
+    return resistance(soil, cycles, criterion, conditions)
+
+
+def resistance(
+    soil: Soil,
+    cycles: float,
+    criterion: dict[str, float],
+    conditions: Conditions,
+    guess: float = _CSR_GUESS,
+    step: float = _BRACKETING,
+) -> float:
+    """The resistance of :func:`crr` next to a guess, from which the search goes out by factors of `step`."""
 
     def weaker(csr: float) -> bool:
         return falls_short(soil, csr, cycles, criterion, conditions)
 
-    found = bracket(weaker, _CSR_GUESS, _BRACKETING, _CSR_RANGE)
+    found = bracket(weaker, min(max(guess, _CSR_RANGE[0]), _CSR_RANGE[1]), step, _CSR_RANGE)
     return math.nan if found is None else bisect(weaker, *found)
 
 

@@ -10,25 +10,38 @@ from __future__ import annotations
 import math
 
 from .._errors import InvalidInput
+from .._model import as_float
 
 P_ATM = 101.3
 """Atmospheric pressure, kPa."""
 
-# Largest blow count and cone resistance of the databases behind the triggering curves; beyond them sand does
-# not liquefy and the polynomials have no meaning.
+# Blow count of relative density 1.
 _N_MAX = 46.0
-_QC_MAX = 211.0
+# Blow count and cone resistance at which the triggering curves end, at resistances of 2 and 3.7: denser sand
+# does not liquefy, and the polynomials run away.
+_N_TRIGGERING_MAX = 37.5
+_QC_TRIGGERING_MAX = 211.0
+# Largest overburden, kPa, that the overburden factor is taken to: from some 3000 kPa on it would be negative.
+_OVERBURDEN_MAX = 2000.0
 # The sustained-shear relation was fitted up to these.
 _ALPHA_MAX = 0.35
 _STATE_INDEX_RANGE = (-0.6, 0.1)
 
 
 def _within(name: str, value: float, low: float, high: float, meaning: str) -> float:
-    if not low < value <= high:
-        raise InvalidInput(
-            f"correlations.{name}", value, f"must be above {low:g} and at most {high:g} ({meaning})"
-        )
-    return float(value)
+    """The value as a float, refused unless it is one number above `low` and at most `high`."""
+    upper = "" if math.isinf(high) else f" and at most {high:g}"
+    try:
+        number = as_float(value)
+    except ValueError:
+        number = math.nan
+    if not low < number <= high or math.isinf(number):
+        raise InvalidInput(f"correlations.{name}", value, f"must be above {low:g}{upper} ({meaning})")
+    return number
+
+
+def _overburden(sigma_v0: float) -> float:
+    return _within("sigma_v0", sigma_v0, 0.0, _OVERBURDEN_MAX, "vertical effective stress, kPa")
 
 
 def relative_density_from_spt(N160cs: float) -> float:
@@ -62,13 +75,13 @@ def shear_modulus_coefficient(N160cs: float) -> float:
 
 def crr_from_spt(N160cs: float) -> float:
     """Cyclic resistance ratio in 15 cycles from (N1)60cs (Idriss and Boulanger 2008)."""
-    n = _within("N160cs", N160cs, 0.0, _N_MAX, "clean-sand corrected blow count")
+    n = _within("N160cs", N160cs, 0.0, _N_TRIGGERING_MAX, "above it sand does not liquefy")
     return math.exp(n / 14.1 + (n / 126.0) ** 2 - (n / 23.6) ** 3 + (n / 25.4) ** 4 - 2.8)
 
 
 def crr_from_cpt(qc1Ncs: float) -> float:
     """Cyclic resistance ratio in 15 cycles from q_c1Ncs (Boulanger and Idriss 2014)."""
-    q = _within("qc1Ncs", qc1Ncs, 0.0, _QC_MAX, "normalised cone resistance, clean sand")
+    q = _within("qc1Ncs", qc1Ncs, 0.0, _QC_TRIGGERING_MAX, "above it sand does not liquefy")
     return math.exp(q / 113.0 + (q / 1000.0) ** 2 - (q / 140.0) ** 3 + (q / 137.0) ** 4 - 2.8)
 
 
@@ -78,7 +91,7 @@ def k_sigma(sigma_v0: float, *, N160cs: float | None = None, qc1Ncs: float | Non
     min(1.1, 1 - C ln(sigma_v0 / p_A)), C = 1/(18.9 - 2.55 sqrt((N1)60cs)) or 1/(37.3 - 8.27 q_c1Ncs^0.264),
     at most 0.3 (Boulanger and Idriss 2004, 2014).
     """
-    _within("sigma_v0", sigma_v0, 0.0, math.inf, "vertical effective stress, kPa")
+    overburden = _overburden(sigma_v0)
     if (N160cs is None) == (qc1Ncs is None):
         raise InvalidInput("correlations.k_sigma", (N160cs, qc1Ncs), "needs exactly one of N160cs and qc1Ncs")
     if N160cs is not None:
@@ -86,10 +99,10 @@ def k_sigma(sigma_v0: float, *, N160cs: float | None = None, qc1Ncs: float | Non
         slope = 18.9 - 2.55 * math.sqrt(n)
     else:
         assert qc1Ncs is not None
-        q = _within("qc1Ncs", qc1Ncs, 0.0, _QC_MAX, "normalised cone resistance, clean sand")
+        q = _within("qc1Ncs", qc1Ncs, 0.0, _QC_TRIGGERING_MAX, "normalised cone resistance, clean sand")
         slope = 37.3 - 8.27 * q**0.264
     c = min(0.3, 1.0 / slope) if slope > 0.0 else 0.3
-    return min(1.1, 1.0 - c * math.log(sigma_v0 / P_ATM))
+    return min(1.1, 1.0 - c * math.log(overburden / P_ATM))
 
 
 def k_alpha(static_shear_ratio: float, *, Dr: float, sigma_v0: float, K0: float = 0.5) -> float:
@@ -98,17 +111,20 @@ def k_alpha(static_shear_ratio: float, *, Dr: float, sigma_v0: float, K0: float 
     Through the relative state parameter index xi_R = 1/(10 - ln(100 p'/p_A)) - Dr with
     p' = (1 + 2 K0) sigma_v0 / 3, which is kept in [-0.6, 0.1]; fitted for ratios up to 0.35.
     """
-    alpha = abs(static_shear_ratio)
-    if alpha > _ALPHA_MAX:
+    try:
+        alpha = abs(as_float(static_shear_ratio))
+    except ValueError:
+        alpha = math.nan
+    if not alpha <= _ALPHA_MAX:
         raise InvalidInput(
-            "correlations.static_shear_ratio", static_shear_ratio, f"must be at most {_ALPHA_MAX}"
+            "correlations.static_shear_ratio",
+            static_shear_ratio,
+            f"must lie in [-{_ALPHA_MAX}, {_ALPHA_MAX}] (static shear stress over sigma_v0)",
         )
-    p = (
-        (1.0 + 2.0 * K0)
-        * _within("sigma_v0", sigma_v0, 0.0, math.inf, "vertical effective stress, kPa")
-        / 3.0
-    )
-    index = 1.0 / (10.0 - math.log(100.0 * p / P_ATM)) - Dr
+    density = _within("Dr", Dr, 0.0, 1.0, "relative density, fraction")
+    earth_pressure = _within("K0", K0, 0.0, math.inf, "horizontal over vertical effective stress")
+    p = (1.0 + 2.0 * earth_pressure) * _overburden(sigma_v0) / 3.0
+    index = 1.0 / (10.0 - math.log(100.0 * p / P_ATM)) - density
     index = min(max(index, _STATE_INDEX_RANGE[0]), _STATE_INDEX_RANGE[1])
     a = 1267.0 + 636.0 * alpha**2 - 634.0 * math.exp(alpha) - 632.0 * math.exp(-alpha)
     b = math.exp(-1.11 + 12.3 * alpha**2 + 1.31 * math.log(alpha + 0.0001))
@@ -122,10 +138,12 @@ def estimates(
     qc1Ncs: float | None = None,
     Dr: float | None = None,
     sigma_v0: float = P_ATM,
+    crr: float | None = None,
 ) -> dict[str, float]:
     """`Dr`, `G0` and `crr` of a sand from one field test or from its density, by the correlations above.
 
-    The resistance is that at the vertical effective stress `sigma_v0`, kPa, through :func:`k_sigma`.
+    The resistance is that at the vertical effective stress `sigma_v0`, kPa, through :func:`k_sigma`, unless
+    `crr` says it: then no triggering curve is asked, and the sand may be denser than they reach.
     """
     given = [
         name for name, value in {"N160cs": N160cs, "qc1Ncs": qc1Ncs, "Dr": Dr}.items() if value is not None
@@ -133,15 +151,14 @@ def estimates(
     if len(given) != 1:
         raise InvalidInput("correlations.estimates", given, "needs exactly one of N160cs, qc1Ncs and Dr")
     if qc1Ncs is not None:
-        density, resistance = relative_density_from_cpt(qc1Ncs), crr_from_cpt(qc1Ncs)
+        density = relative_density_from_cpt(qc1Ncs)
     elif N160cs is not None:
-        density, resistance = relative_density_from_spt(N160cs), crr_from_spt(N160cs)
+        density = relative_density_from_spt(N160cs)
     else:
         assert Dr is not None
-        density, resistance = Dr, crr_from_spt(spt_from_relative_density(Dr))
+        density = _within("Dr", Dr, 0.0, 1.0, "relative density, fraction")
     blows = spt_from_relative_density(density)
-    return {
-        "Dr": density,
-        "G0": shear_modulus_coefficient(blows),
-        "crr": resistance * k_sigma(sigma_v0, N160cs=blows),
-    }
+    if crr is None:
+        at_one_atmosphere = crr_from_spt(blows) if qc1Ncs is None else crr_from_cpt(qc1Ncs)
+        crr = at_one_atmosphere * k_sigma(sigma_v0, N160cs=blows)
+    return {"Dr": density, "G0": shear_modulus_coefficient(blows), "crr": crr}
