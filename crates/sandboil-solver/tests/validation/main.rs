@@ -7,3 +7,4 @@ mod consolidation;
 mod shear_cell;
 mod stages;
 mod wave_column;
+mod waves;

@@ -1,9 +1,11 @@
 //! Vertical shear waves in an elastic column on the compliant base against the closed form: the surface moves
 //! with twice the upgoing wave, delayed by the travel time.
 
-use crate::common::{column, elastic, shaking};
-use sandboil_solver::{Model, Operators, Shaking, Simulation, UpgoingWave};
-use sandboil_sph::Vec2;
+use crate::{
+    common::{column, elastic},
+    waves::{amplitude, damping_ratio, ricker, surface_velocity, weightless},
+};
+use sandboil_solver::{Model, Operators};
 use std::f64::consts::PI;
 
 const SPEED: f64 = 100.0;
@@ -12,47 +14,14 @@ const HEIGHT: f64 = 20.0;
 /// Time of the pulse's centre at the base, s.
 const CENTRE: f64 = 0.8;
 const DURATION: f64 = 2.2;
-/// Sampling of the incoming wave, s.
-const INTERVAL: f64 = 1e-3;
 
-/// Ricker pulse of a central frequency, peak one at time zero.
-fn ricker(frequency: f64, time: f64) -> f64 {
-    let x = (PI * frequency * time).powi(2);
-    (1.0 - 2.0 * x) * (-x).exp()
-}
-
-/// The same column without weight: initial stress turns with the soil and would change its wave speed.
-fn weightless(mut model: Model) -> Model {
-    model.gravity *= 1e-9;
-    model.vertical_effective_stress.fill(0.0);
-    model
-}
-
-/// Velocity at the surface of a column under an upgoing wave: times and values.
-fn surface_velocity(
-    operators: Operators,
-    spacing: f64,
-    smoothing_ratio: f64,
-    upgoing: impl Fn(f64) -> f64,
-    duration: f64,
-    adjust: impl Fn(&mut Shaking),
-) -> (Vec<f64>, Vec<f64>) {
+/// A uniform column of the given operators.
+fn uniform(operators: Operators, spacing: f64, smoothing_ratio: f64) -> Model {
     let shear_modulus = DENSITY * SPEED * SPEED;
     let mut model = weightless(column(HEIGHT, spacing, 1, elastic(shear_modulus, 2.0 * shear_modulus), None));
     model.numerics.operators = operators;
     model.numerics.smoothing_ratio = smoothing_ratio;
-    let samples = (duration / INTERVAL) as usize;
-    let velocity = (0..samples).map(|k| upgoing(k as f64 * INTERVAL)).collect();
-    let mut simulation = Simulation::new(&model, 1).unwrap();
-    let probe = Vec2::new(0.5 * spacing, HEIGHT);
-    let mut stage = shaking(Some(UpgoingWave { interval: INTERVAL, velocity }), duration, vec![probe]);
-    adjust(&mut stage);
-    simulation.begin_shaking(stage).unwrap();
-    assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
-    let (times, values) = simulation.take_histories();
-    let channels = simulation.channel_names();
-    let place = channels.iter().position(|name| *name == "velocity_x").unwrap();
-    (times, values.chunks(channels.len()).map(|row| row[place]).collect())
+    model
 }
 
 fn surface_pulse(
@@ -61,14 +30,8 @@ fn surface_pulse(
     smoothing_ratio: f64,
     frequency: f64,
 ) -> (Vec<f64>, Vec<f64>) {
-    surface_velocity(
-        operators,
-        spacing,
-        smoothing_ratio,
-        |time| ricker(frequency, time - CENTRE),
-        DURATION,
-        |_| (),
-    )
+    let model = uniform(operators, spacing, smoothing_ratio);
+    surface_velocity(&model, |time| ricker(frequency, time - CENTRE), DURATION, |_| ())
 }
 
 /// Phase error of the least-squares operators, `1 - c_num/c = 5.0 (h / lambda)^2`, put through the spectrum of the
@@ -131,20 +94,9 @@ fn ricker_pulse_on_a_compliant_base() {
 fn transfer_function_of_the_matched_column_is_one() {
     for (ratio, bound) in [(1.4, 0.012), (1.2, 0.007)] {
         let (times, found) = surface_pulse(Operators::Conservative, 0.2, ratio, 5.0);
-        let amplitude = |frequency: f64, value: &dyn Fn(usize) -> f64| {
-            let (mut re, mut im) = (0.0, 0.0);
-            for (k, time) in times.iter().enumerate() {
-                let (sin, cos) = (2.0 * PI * frequency * time).sin_cos();
-                re += value(k) * cos;
-                im += value(k) * sin;
-            }
-            f64::hypot(re, im)
-        };
+        let outcrop: Vec<f64> = times.iter().map(|t| 2.0 * ricker(5.0, t - CENTRE)).collect();
         let worst = [0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0]
-            .map(|f| {
-                let outcrop = amplitude(f, &|k| 2.0 * ricker(5.0, times[k] - CENTRE));
-                amplitude(f, &|k| found[k]) / outcrop - 1.0
-            })
+            .map(|f| amplitude(&times, &found, f) / amplitude(&times, &outcrop, f) - 1.0)
             .into_iter()
             .fold(0.0_f64, |a, b| a.max(b.abs()));
         println!("h/dx {ratio}: transfer function off one by at most {:.2} %", 100.0 * worst);
@@ -152,42 +104,15 @@ fn transfer_function_of_the_matched_column_is_one() {
     }
 }
 
-/// Damping ratio of the column's free vibration on a rigid base, driven gently at its resonance and left alone.
-fn damping_ratio(local_damping: f64) -> f64 {
-    // Resonance must stay within small strains, m/s.
-    const SMALL: f64 = 1e-3;
-    let period = 4.0 * HEIGHT / SPEED;
-    // A smooth start and end of the drive leave the higher modes at rest: theirs would disturb the sign of v.
-    let driven = 8.0 * period;
-    let push = |time: f64| {
-        let envelope = if time < driven { (PI * time / driven).sin().powi(2) } else { 0.0 };
-        SMALL * envelope * (2.0 * PI * time / period).sin()
-    };
-    let (times, velocity) =
-        surface_velocity(Operators::Conservative, 0.4, 1.4, push, driven + 8.0 * period, |stage| {
-            stage.half_space = Some((1e6 * SPEED, DENSITY));
-            stage.local_damping = local_damping;
-        });
-    let amplitude = |cycle: f64| {
-        let from = driven + cycle * period;
-        let (mut re, mut im) = (0.0, 0.0);
-        for (t, v) in times.iter().zip(&velocity).filter(|(t, _)| (from..from + period).contains(*t)) {
-            let (sin, cos) = (2.0 * PI * t / period).sin_cos();
-            re += v * cos;
-            im += v * sin;
-        }
-        f64::hypot(re, im)
-    };
-    let cycles = 5.0;
-    (amplitude(1.0) / amplitude(1.0 + cycles)).ln() / (2.0 * PI * cycles)
-}
-
 /// Local damping (Eq. 16) of strength `xi` is a damping ratio `xi / pi` at any frequency, beside the
 /// trace that the nearly rigid base lets out.
 #[test]
 fn local_damping_is_a_ratio_of_xi_over_pi() {
     const XI: f64 = 0.05;
-    let (without, with) = (damping_ratio(0.0), damping_ratio(XI));
+    let model = uniform(Operators::Conservative, 0.4, 1.4);
+    let period = 4.0 * HEIGHT / SPEED;
+    let ratio = |xi: f64| damping_ratio(&model, period, |stage| stage.local_damping = xi);
+    let (without, with) = (ratio(0.0), ratio(XI));
     println!(
         "damping ratio {:.3} % without, {:.3} % with, xi/pi {:.3} %",
         100.0 * without,
