@@ -13,7 +13,7 @@ import pytest
 import tomli_w
 from sandboil._errors import InvalidInput, SandboilError, SimulationDiverged, nearest_name
 from sandboil.materials import Elastic, PM4Sand
-from sandboil.scene import Box, Gravity, Region, Scene, Shaking, box, polygon
+from sandboil.scene import Box, Gravity, Rayleigh, Region, Scene, Shaking, box, polygon
 from sandboil.simulation import Simulation
 
 SOUND: dict[str, Any] = {
@@ -493,6 +493,61 @@ CASES: dict[str, tuple[Change, str, object, str, str | None]] = {
         0.01,
         "goes with acceleration_g or velocity",
         None,
+    ),
+    "damping in per cent": (
+        setting("stages.1.rayleigh", {"ratio": 0.5, "frequencies": [1.0, 10.0]}),
+        "scene.stages[1].rayleigh.ratio",
+        0.5,
+        "must lie in (0, 0.3]",
+        "a fraction",
+    ),
+    "no damping": (
+        setting("stages.1.rayleigh", {"ratio": 0.0, "frequencies": [1.0, 10.0]}),
+        "scene.stages[1].rayleigh.ratio",
+        0.0,
+        "must lie in (0, 0.3]",
+        None,
+    ),
+    "damping without its frequencies": (
+        setting("stages.1.rayleigh", {"ratio": 0.005}),
+        "scene.stages[1].rayleigh.frequencies",
+        None,
+        "is required",
+        None,
+    ),
+    "descending frequencies of damping": (
+        setting("stages.1.rayleigh", {"ratio": 0.005, "frequencies": [10.0, 1.0]}),
+        "scene.stages[1].rayleigh.frequencies",
+        (10.0, 1.0),
+        "must ascend",
+        "frequencies = [1, 10]",
+    ),
+    "one frequency of damping twice": (
+        setting("stages.1.rayleigh", {"ratio": 0.005, "frequencies": [2.0, 2.0]}),
+        "scene.stages[1].rayleigh.frequencies",
+        (2.0, 2.0),
+        "must ascend",
+        "five times",
+    ),
+    "a frequency of damping that is none": (
+        setting("stages.1.rayleigh", {"ratio": 0.005, "frequencies": [0.0, 10.0]}),
+        "scene.stages[1].rayleigh.frequencies[0]",
+        0.0,
+        "must lie in [0.01, 1000]",
+        None,
+    ),
+    "Rayleigh damping of the printed operators": (
+        lambda scene: scene.update(
+            numerics={"operators": "printed"},
+            stages=[
+                {"kind": "gravity"},
+                {"kind": "shaking", "duration": 1.0, "rayleigh": {"ratio": 0.01, "frequencies": [1.0, 5.0]}},
+            ],
+        ),
+        "scene.stages[1].rayleigh",
+        Rayleigh(ratio=0.01, frequencies=(1.0, 5.0)),
+        "left out with the printed operators",
+        "numerics.local_damping",
     ),
     "misspelt argument of a generator": (
         setting("stages.1.motion", {"synthetic": {"pga": 0.3}}),

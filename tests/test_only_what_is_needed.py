@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 import scenes
-from sandboil import Elastic, Gravity, Numerics, Output, Region, Scene, Simulation, box
+from sandboil import Elastic, Gravity, Numerics, Output, Rayleigh, Region, Scene, Shaking, Simulation, box
 
 
 def at_the_end(scene: Scene) -> Simulation:
@@ -103,6 +103,19 @@ def test_the_printed_operators_are_not_carried_unless_asked_for() -> None:
     assert "printed_stress" not in at_the_end(elastic_column()).arrays()
     printed = at_the_end(elastic_column(numerics=Numerics(operators="printed")))
     assert "printed_stress" in printed.arrays()
+
+
+def test_damping_that_is_not_asked_for_is_not_computed() -> None:
+    plain = at_the_end(elastic_column())
+    assert "viscous_stress" not in plain.arrays()
+    assert plain.undamped_dt is None
+    rayleigh = Rayleigh(ratio=0.05, frequencies=(1.0, 10.0))
+    damped = at_the_end(
+        elastic_column(stages=[Gravity(), Shaking(scenes.PULSE, duration=0.8, rayleigh=rayleigh)])
+    )
+    assert damped.arrays()["viscous_stress"] > 0
+    assert damped.undamped_dt == pytest.approx(plain.dt)
+    assert damped.dt < plain.dt
 
 
 def test_small_strain_builds_the_geometry_once_per_wall() -> None:

@@ -21,6 +21,7 @@ from sandboil.scene import (
     MotionSpec,
     Numerics,
     Output,
+    Rayleigh,
     Region,
     Scene,
     Shaking,
@@ -134,10 +135,20 @@ def scenes(draw: st.DrawFn) -> Scene:
                 K0=draw(st.floats(0.1, 0.9)),
             )
         )
+    rayleigh = draw(
+        st.none()
+        | st.builds(
+            Rayleigh,
+            ratio=st.floats(0.001, 0.3),
+            frequencies=st.tuples(st.floats(0.01, 2.0), st.floats(3.0, 1000.0)),
+        )
+    )
+    printed = Numerics(operators="printed", local_damping=0.05)
     shaking = Shaking(
         draw(motions),
         base=draw(st.sampled_from([CompliantBase(), CompliantBase(Vs=300.0, density=2.1)])),
         duration=draw(st.floats(0.1, 100.0)),
+        rayleigh=rayleigh,
     )
     return Scene(
         spacing=draw(st.floats(0.05, 0.5)),
@@ -147,7 +158,7 @@ def scenes(draw: st.DrawFn) -> Scene:
         regions=regions,
         stages=[Gravity(tolerance=draw(st.floats(1e-8, 1e-2))), *draw(st.sampled_from([[], [shaking]]))],
         output=draw(st.sampled_from([Output(), Output(depths=[0.1, 0.25], points=[(0.5, 0.25)])])),
-        numerics=draw(st.sampled_from([Numerics(), Numerics(operators="printed", local_damping=0.05)])),
+        numerics=draw(st.sampled_from([Numerics()] if rayleigh else [Numerics(), printed])),
     )
 
 
@@ -373,6 +384,10 @@ def test_only_what_the_scene_requires_is_active() -> None:
     damped = column(numerics=Numerics(local_damping=0.05, velocity_filter=0.0))
     assert "local damping" in active(damped)
     assert "velocity filter" not in active(damped)
+    rayleigh = Rayleigh(ratio=0.005, frequencies=(1.0, 10.0))
+    viscous = column(stages=[Gravity(), Shaking(duration=1.0, rayleigh=rayleigh)])
+    assert ("Rayleigh damping", True, "0.5 % at 1 and 10 Hz") in viscous.active_physics()
+    assert ("Rayleigh damping", False, "no shaking stage asks for it") in column().active_physics()
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scenes
-from sandboil import Gravity, Output, Region, Shaking, Simulation, box
+from sandboil import Gravity, Output, Rayleigh, Region, Shaking, Simulation, box
 
 # Loops over fewer rows than this run on one thread (sandboil-solver, parallel.rs).
 FEWEST_THREADED_ROWS = 256
@@ -18,7 +18,10 @@ def computed(threads: int) -> tuple[dict[str, np.ndarray], np.ndarray, dict[str,
             Region("loose", box(x=(0, 4), y=(2, 4)), scenes.LOOSE, hydraulic_conductivity=1e-4, Gs=2.67),
             Region("dense", box(x=(0, 4), y=(0, 2)), scenes.DENSE, hydraulic_conductivity=1e-4, Gs=2.67),
         ],
-        stages=[Gravity(), Shaking(scenes.PULSE, duration=0.6)],
+        stages=[
+            Gravity(),
+            Shaking(scenes.PULSE, duration=0.6, rayleigh=Rayleigh(ratio=0.005, frequencies=(1.0, 10.0))),
+        ],
         output=Output(depths=[1.0, 3.0]),
     )
     simulation = Simulation(ground, threads=threads)

@@ -33,6 +33,7 @@ class StagePlan:
     name : of the stage
     duration : s; None for gravity, which ends at rest
     dt, dt_limit : time step at the beginning, s, and what limits it
+    undamped_dt : time step without the stage's Rayleigh damping, s; None if it has none
     steps : expected; None where they cannot be told before
     step_time : wall time of a step in the trial, s
     trial_steps : number of steps of the trial
@@ -43,6 +44,7 @@ class StagePlan:
     duration: float | None
     dt: float
     dt_limit: str
+    undamped_dt: float | None
     steps: int | None
     step_time: float
     trial_steps: int
@@ -120,8 +122,9 @@ class Plan:
 def _stage_lines(stage: StagePlan) -> list[str]:
     told = f"{stage.duration:g} s" if stage.duration is not None else "to rest"
     steps = f"{stage.steps} steps" if stage.steps is not None else "number of steps not known before"
+    without = f" ({stage.undamped_dt:.3g} s without Rayleigh damping)" if stage.undamped_dt else ""
     return [
-        f"{stage.name}: {told}, {steps} of {stage.dt:.3g} s, limited by the {stage.dt_limit}",
+        f"{stage.name}: {told}, {steps} of {stage.dt:.3g} s, limited by the {stage.dt_limit}{without}",
         f"  {_duration(stage.wall_time)}, {stage.step_time * 1e3:.3g} ms a step in a trial of "
         f"{stage.trial_steps} steps",
     ]
@@ -182,7 +185,7 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
     for index, stage in enumerate(scene.stages):
         if index > 0:
             simulation.begin_next_stage()
-        dt, dt_limit = simulation.dt, simulation.dt_limit
+        dt, dt_limit, undamped_dt = simulation.dt, simulation.dt_limit, simulation.undamped_dt
         start = time.perf_counter()
         trial_end = start + TRIAL_SECONDS
         done = False
@@ -198,6 +201,7 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
                 duration=duration,
                 dt=dt,
                 dt_limit=dt_limit,
+                undamped_dt=undamped_dt,
                 steps=steps,
                 step_time=step_time,
                 trial_steps=made,

@@ -180,6 +180,11 @@ class Simulation:
         return self._core.time_step[1]
 
     @property
+    def undamped_dt(self) -> float | None:
+        """Time step that the stage would have without its Rayleigh damping, s; None if it has none."""
+        return self._core.undamped_time_step
+
+    @property
     def steps(self) -> int:
         """Steps made in the present stage."""
         return self._core.step
@@ -242,13 +247,14 @@ class Simulation:
             self._core.begin_gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
             return
         scene, output = self.scene, self.scene.output
-        base = stage.base
+        base, rayleigh = stage.base, stage.rayleigh
         self._core.begin_shaking(
             {
                 "duration": self.duration,
                 "wave": self._waves[self._index],
                 "half_space": None if base.Vs is None else (base.Vs, base.density),
                 "local_damping": scene.numerics.local_damping,
+                "rayleigh": None if rayleigh is None else (rayleigh.ratio, rayleigh.frequencies),
                 "time_step_factor": scene.numerics.time_step_factor,
                 "probes": np.array([(probe.x, probe.y) for probe in self.probes]),
                 "history_interval": output.history_dt,

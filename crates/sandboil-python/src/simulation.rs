@@ -138,11 +138,13 @@ impl Simulation {
                 Ok(solver::UpgoingWave { interval, velocity: velocity.as_slice()?.to_vec() })
             })
             .transpose()?;
+        let rayleigh: Option<(f64, [f64; 2])> = get(stage, "rayleigh")?;
         let stage = solver::Shaking {
             duration: get(stage, "duration")?,
             wave,
             half_space: get(stage, "half_space")?,
             local_damping: get(stage, "local_damping")?,
+            rayleigh: rayleigh.map(|(ratio, frequencies)| solver::Rayleigh { ratio, frequencies }),
             time_step_factor: get::<Option<f64>>(stage, "time_step_factor")?
                 .unwrap_or(solver::SHAKING_FACTOR),
             probes: vectors(&get(stage, "probes")?),
@@ -189,6 +191,12 @@ impl Simulation {
     fn time_step(&self) -> (f64, &'static str) {
         let (dt, criterion) = self.inner.time_step();
         (dt, criterion.name())
+    }
+
+    /// Time step (s) that the stage would have without its Rayleigh damping; None if it has none.
+    #[getter]
+    fn undamped_time_step(&self) -> Option<f64> {
+        self.inner.undamped_time_step()
     }
 
     #[getter]

@@ -13,6 +13,7 @@ mod geometry;
 pub mod model;
 mod parallel;
 mod phases;
+mod rayleigh;
 mod record;
 pub mod shear_cell;
 pub mod simulation;
@@ -25,6 +26,7 @@ mod timestep;
 pub use base::UpgoingWave;
 pub use error::SolverError;
 pub use model::{AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, Water, stress_node_offset};
+pub use rayleigh::Rayleigh;
 pub use sandboil_sph::{Period, Vec2};
 pub use shear_cell::{Sample, ShearCell, ShearTest};
 pub use simulation::{

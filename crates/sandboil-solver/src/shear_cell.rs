@@ -358,7 +358,8 @@ impl ShearCell {
     /// Time step at the safe share of the limit of the present stiffness, s.
     fn limit(&self) -> f64 {
         let stiffest = self.points.iter().map(|point| point.stiffness).fold(0.0, f64::max);
-        SHAKING_FACTOR * region_limit(&self.model, 0, stiffest, PressureCoupling::None, &self.spectrum).0
+        SHAKING_FACTOR
+            * region_limit(&self.model, 0, stiffest, PressureCoupling::None, &self.spectrum, None).0
     }
 
     /// Advances by at most `steps` steps; returns whether the test has reached its end.

@@ -9,6 +9,7 @@ use crate::{
     model::{AccelerationTerm, Diffusion, Model, Operators, STRESS_NODES},
     parallel::{Rows, chunks, for_each_chunk},
     phases::Phases,
+    rayleigh::{Rayleigh, RayleighDamping},
     record::{Probes, Recorder},
     skeleton::{
         NodalShare, PrintedStress, StressPoint, conservative_force, local_damping, maximum_shear_strain,
@@ -59,6 +60,8 @@ pub struct Shaking {
     pub half_space: Option<(f64, f64)>,
     /// Local damping `xi_l` of Eq. 16.
     pub local_damping: f64,
+    /// Rayleigh damping, if any.
+    pub rayleigh: Option<Rayleigh>,
     /// Factor on the stability limit.
     pub time_step_factor: f64,
     /// Points where histories are read, m.
@@ -144,6 +147,7 @@ pub struct Simulation {
     spectrum: PressureSpectrum,
     flow: Option<Flow>,
     printed_stress: Option<PrintedStress>,
+    rayleigh: Option<RayleighDamping>,
     active: Active,
     time: f64,
     step: u64,
@@ -197,6 +201,7 @@ impl Simulation {
             flow: None,
             printed_stress: geometry.printed.as_ref().map(|_| PrintedStress::default()),
             geometry,
+            rayleigh: None,
             active: Active::None,
             time: 0.0,
             step: 0,
@@ -220,6 +225,7 @@ impl Simulation {
         self.set_wall(Wall::NO_SLIP);
         self.soil = SoilField::elastic(&self.model, &mut self.points)?;
         self.flow = None;
+        self.rayleigh = None;
         let gravity = Vec2::new(0.0, -self.model.gravity);
         self.constant_force = self.mass.iter().map(|mass| gravity * *mass).collect();
         if self.model.water.is_some() {
@@ -253,6 +259,17 @@ impl Simulation {
                 return Err(SolverError::InvalidInput { name, value, expected: "positive" });
             }
         }
+        if let Some(rayleigh) = &stage.rayleigh {
+            rayleigh.validate()?;
+            if self.model.numerics.operators == Operators::Printed {
+                return Err(SolverError::InvalidInput {
+                    name: "rayleigh.ratio",
+                    value: rayleigh.ratio,
+                    expected: "left out with the printed operators, whose force is not the transpose of their strain",
+                });
+            }
+        }
+        self.rayleigh = stage.rayleigh.map(|law| RayleighDamping::new(law, self.points.len()));
         let goes_on = matches!(self.active, Active::Shaking(_));
         if goes_on {
             self.renew_geometry();
@@ -406,6 +423,9 @@ impl Simulation {
             let motion = motion(&self.geometry, s, velocity);
             self.shares[s] = motion.share(&self.points[s], self.geometry.covariance[s], filter);
         }
+        if let Some(rayleigh) = &mut self.rayleigh {
+            rayleigh.add_stress(false, &self.geometry, velocity, &self.points, &mut self.shares);
+        }
     }
 
     /// Strength `xi / dx` of the velocity filter, 1/m.
@@ -441,6 +461,17 @@ impl Simulation {
 
     /// Time step at `factor` of the limit of the present stiffness.
     fn limit(&self, coupling: PressureCoupling, factor: f64) -> (f64, Criterion) {
+        let rayleigh = self.rayleigh.as_ref().map(RayleighDamping::law);
+        self.limit_under(rayleigh, coupling, factor)
+    }
+
+    /// The same under another damping than the stage's.
+    fn limit_under(
+        &self,
+        rayleigh: Option<&Rayleigh>,
+        coupling: PressureCoupling,
+        factor: f64,
+    ) -> (f64, Criterion) {
         let mut stiffest = vec![0.0_f64; self.model.regions.len()];
         for (s, point) in self.points.iter().enumerate() {
             let slot = &mut stiffest[self.model.region[s / STRESS_NODES] as usize];
@@ -451,7 +482,7 @@ impl Simulation {
             .enumerate()
             .filter(|(_, stiffness)| **stiffness > 0.0)
             .map(|(region, &stiffness)| {
-                region_limit(&self.model, region, stiffness, coupling, &self.spectrum)
+                region_limit(&self.model, region, stiffness, coupling, &self.spectrum, rayleigh)
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .unwrap_or_default();
@@ -510,6 +541,9 @@ impl Simulation {
                     }
                 }
             }
+        }
+        if let Some(rayleigh) = &self.rayleigh {
+            force += rayleigh.force(&self.geometry, j, self.mass[j], velocity);
         }
         force
     }
@@ -616,6 +650,10 @@ impl Simulation {
             Some((quantity, node, value)) => self.diverged(quantity, node, value),
             None => error,
         })?;
+        if let Some(rayleigh) = &mut self.rayleigh {
+            let (geometry, velocity) = (&self.geometry, &self.velocity);
+            rayleigh.add_stress(self.threads > 1, geometry, velocity, &self.points, &mut self.shares);
+        }
         self.counters.soil.merge(&report);
         self.counters.plastic_updates += self.soil.plastic_points() as u64;
         self.counters.steps += 1;
@@ -820,6 +858,16 @@ impl Simulation {
         (self.dt, self.criterion)
     }
 
+    /// Time step that the present stiffness would allow without the stage's Rayleigh damping, s; `None` if it has none.
+    pub fn undamped_time_step(&self) -> Option<f64> {
+        match (&self.active, &self.rayleigh) {
+            (Active::Shaking(shaking), Some(_)) => {
+                Some(self.limit_under(None, shaking.coupling, shaking.stage.time_step_factor).0)
+            }
+            _ => None,
+        }
+    }
+
     /// Largest unbalanced acceleration over gravity in the gravity stage; infinite before its first step.
     pub fn residual(&self) -> f64 {
         match self.active {
@@ -873,6 +921,9 @@ impl Simulation {
         }
         if let Some(printed) = &self.printed_stress {
             arrays.push(("printed_stress", printed.bytes()));
+        }
+        if let Some(rayleigh) = &self.rayleigh {
+            arrays.push(("viscous_stress", rayleigh.bytes()));
         }
         if let Active::Shaking(shaking) = &self.active {
             arrays.push(("base", shaking.base.bytes()));

@@ -38,6 +38,16 @@ pub struct NodalShare {
     filter: f64,
 }
 
+impl NodalShare {
+    /// Adds a volume times nominal stress, kN/m, to what the gradient weights meet.
+    #[inline]
+    pub fn add(&mut self, tensor: &[f64; 4]) {
+        for (sum, more) in self.tensor.iter_mut().zip(tensor) {
+            *sum += more;
+        }
+    }
+}
+
 /// Least shear-wave speed of the filter, m/s: liquefied soil still needs its short waves damped.
 const LEAST_FILTER_SPEED: f64 = 20.0;
 

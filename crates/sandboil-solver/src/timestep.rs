@@ -1,6 +1,9 @@
 //! The largest stable time step, by measured limits, and what sets it.
 
-use crate::model::{Model, Operators};
+use crate::{
+    model::{Model, Operators},
+    rayleigh::Rayleigh,
+};
 use sandboil_sph::{
     Vec2, WendlandQuintic,
     operators::{Member, corrected_gradient, laplacian_factor},
@@ -18,6 +21,9 @@ const DIFFUSION_COEFFICIENT: f64 = 0.65;
 const FILTER_EIGENVALUE: f64 = 1.05;
 /// Largest shear-wave over compression-wave speed of a soil: that of Poisson's ratio zero.
 const LARGEST_SPEED_RATIO: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Damping ratio of the fastest wave above which its viscous part alone, `dt < 1/(xi w)`, allows less than the wave,
+/// `dt < 2/w`.
+const VISCOUS_RATIO: f64 = 0.5;
 /// Wave numbers sampled along an axis and along a diagonal of the lattice.
 const SPECTRUM_SAMPLES: u32 = 24;
 /// Bisections of the implicit limit: one part in a thousand.
@@ -35,6 +41,8 @@ pub enum Criterion {
     DrainingWave,
     /// Explicit diffusion of pore pressure.
     Diffusion,
+    /// Viscous stress of Rayleigh damping.
+    Damping,
 }
 
 impl Criterion {
@@ -45,6 +53,7 @@ impl Criterion {
             Self::UndrainedWave => "undrained compression wave",
             Self::DrainingWave => "partly drained compression wave",
             Self::Diffusion => "explicit pore-pressure diffusion",
+            Self::Damping => "Rayleigh damping of the shortest waves",
         }
     }
 }
@@ -118,41 +127,55 @@ impl PressureSpectrum {
     }
 }
 
-/// What the velocity filter leaves of the limit `dt_0`; the printed set has none.
-///
-/// A leapfrog with damping `c` on the lagging velocity is stable while `(dt/dt_0)^2 + (c dt_0/2) (dt/dt_0) < 1`,
-/// here with the filter's largest eigenvalue on the fastest wave, for which `dt_0 = h / c_d`.
-fn filter_factor(model: &Model) -> f64 {
+/// Damping ratio of the velocity filter's largest eigenvalue on the fastest wave, of frequency `2 c_d / h`; the
+/// printed set has none.
+fn filter_ratio(model: &Model) -> f64 {
     if model.numerics.operators == Operators::Printed {
-        return 1.0;
+        return 0.0;
     }
     let damping = FILTER_EIGENVALUE * model.numerics.velocity_filter * LARGEST_SPEED_RATIO;
-    let half = 0.25 * damping * model.numerics.smoothing_ratio;
-    (1.0 + half * half).sqrt() - half
+    0.25 * damping * model.numerics.smoothing_ratio
+}
+
+/// What a damping ratio of the fastest wave leaves of its limit `dt_0 = 2/w`.
+///
+/// A leapfrog with damping `2 xi w` on the lagging velocity is stable while `(dt/dt_0)^2 + 2 xi (dt/dt_0) < 1`.
+fn left_by_damping(ratio: f64) -> f64 {
+    (1.0 + ratio * ratio).sqrt() - ratio
 }
 
 /// Limit for one region at a skeleton stiffness `K + 4G/3` in kPa, s.
 ///
-/// `spectrum` belongs to implicit diffusion and is read only there.
+/// `spectrum` belongs to implicit diffusion and is read only there. Rayleigh damping acts on the skeleton alone: its
+/// rate is that of the skeleton's fastest wave, whatever the water adds to the frequency.
 pub fn region_limit(
     model: &Model,
     region: usize,
     skeleton_stiffness: f64,
     coupling: PressureCoupling,
     spectrum: &PressureSpectrum,
+    rayleigh: Option<&Rayleigh>,
 ) -> (f64, Criterion) {
     let h = model.smoothing_length();
     let density = model.mixture_density(region);
-    let filter = filter_factor(model);
-    let wave = |coefficient: f64, stiffness: f64| coefficient * h / (stiffness / density).sqrt() * filter;
-    let drained = (wave(DRAINED_COEFFICIENT, skeleton_stiffness), Criterion::DrainedWave);
+    let undamped = |coefficient: f64, stiffness: f64| coefficient * h / (stiffness / density).sqrt();
+    let longest = undamped(DRAINED_COEFFICIENT, skeleton_stiffness);
+    let rate = rayleigh.map_or(0.0, |damping| damping.rate(2.0 / longest));
+    let (filter, viscous) = (filter_ratio(model), |limit: f64| 0.25 * rate * limit);
+    let wave = |coefficient: f64, stiffness: f64, criterion: Criterion| {
+        let limit = undamped(coefficient, stiffness);
+        let ratio = viscous(limit);
+        let named = if ratio > VISCOUS_RATIO { Criterion::Damping } else { criterion };
+        (limit * left_by_damping(filter + ratio), named)
+    };
+    let drained = wave(DRAINED_COEFFICIENT, skeleton_stiffness, Criterion::DrainedWave);
     if coupling == PressureCoupling::None {
         return drained;
     }
     let water = model.water_stiffness(model.regions[region].porosity);
     let diffusivity = model.pressure_diffusivity(region);
     let coefficient = if diffusivity > 0.0 { UNDRAINED_COEFFICIENT } else { FREE_UNDRAINED_COEFFICIENT };
-    let undrained = (wave(coefficient, skeleton_stiffness + water), Criterion::UndrainedWave);
+    let undrained = wave(coefficient, skeleton_stiffness + water, Criterion::UndrainedWave);
     let combined = if undrained.0 < drained.0 { undrained } else { drained };
     if diffusivity == 0.0 {
         return combined;
@@ -163,9 +186,10 @@ pub fn region_limit(
         let both = (combined.0.powi(-2) + diffusion.powi(-2)).powf(-0.5);
         return (both, if diffusion < combined.0 { Criterion::Diffusion } else { combined.1 });
     }
+    let left = left_by_damping(filter + viscous(longest));
     // Water that drains at grid scale within a step stiffens the short waves no more.
     let stable =
-        |dt: f64| (dt / drained.0).powi(2) + spectrum.share(water / density, diffusivity, dt / filter) <= 1.0;
+        |dt: f64| (dt / drained.0).powi(2) + spectrum.share(water / density, diffusivity, dt / left) <= 1.0;
     let (mut low, mut high) = (combined.0.min(drained.0), drained.0);
     if !stable(low) {
         return combined;
@@ -174,5 +198,5 @@ pub fn region_limit(
         let middle = 0.5 * (low + high);
         if stable(middle) { low = middle } else { high = middle }
     }
-    (low, if low > 0.99 * drained.0 { Criterion::DrainedWave } else { Criterion::DrainingWave })
+    (low, if low > 0.99 * drained.0 { drained.1 } else { Criterion::DrainingWave })
 }

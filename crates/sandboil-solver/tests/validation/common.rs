@@ -72,6 +72,7 @@ pub fn shaking(wave: Option<UpgoingWave>, duration: f64, probes: Vec<Vec2>) -> S
         wave,
         half_space: None,
         local_damping: 0.0,
+        rayleigh: None,
         time_step_factor: SHAKING_FACTOR,
         probes,
         history_interval: 0.001,

@@ -4,6 +4,7 @@
 
 mod common;
 mod consolidation;
+mod rayleigh;
 mod shear_cell;
 mod stages;
 mod wave_column;
