@@ -49,7 +49,12 @@ def records() -> Path | None:
 
 
 def scene(
-    motion: sb.Motion | None, *, spacing: float = 0.2, width: float | None = None, **numerics: Any
+    motion: sb.Motion | None,
+    *,
+    spacing: float = 0.2,
+    width: float | None = None,
+    rayleigh: sb.Rayleigh | None = None,
+    **numerics: Any,
 ) -> sb.Scene:
     """The site as a column `width` wide (one particle if not given), shaken for 40 s."""
     return sb.Scene(
@@ -62,7 +67,7 @@ def scene(
             )
             for name, y, sand in LAYERS
         ],
-        stages=[sb.Gravity(), sb.Shaking(motion, duration=DURATION)],
+        stages=[sb.Gravity(), sb.Shaking(motion, duration=DURATION, rayleigh=rayleigh)],
         output=sb.Output(depths=DEPTHS, history_dt=0.005, field_dt=1.0),
         numerics=sb.Numerics(**numerics),
     )
@@ -159,6 +164,7 @@ ROWS: dict[str, dict[str, Any]] = {
     "filter 0.4": {"velocity_filter": 0.4},
     "filter 0.1, local damping 0.05": {"velocity_filter": 0.1, "local_damping": 0.05},
     "local damping 0.05": {"local_damping": 0.05},
+    "Rayleigh 0.5 % at 1 and 10 Hz": {"rayleigh": sb.Rayleigh(ratio=0.005, frequencies=(1.0, 10.0))},
     "explicit, with acceleration": {"diffusion": "explicit", "acceleration_term": "on"},
     "explicit, without": {"diffusion": "explicit", "acceleration_term": "off"},
     "dt factor 0.3": {"time_step_factor": 0.3},
