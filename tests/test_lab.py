@@ -152,6 +152,7 @@ def by_hand(turns: list[float], r_u: list[float]) -> lab.CyclicTest:
         eps_v=nothing,
         void_ratio=nothing,
         sigma_v0=100.0,
+        drained=False,
         cycle=np.array(cycle),
         turns=np.array(made),
         complete=True,

@@ -294,7 +294,8 @@ impl Specimen {
     }
 }
 
-fn columns<'py>(py: Python<'py>, record: &Record) -> PyResult<Bound<'py, PyDict>> {
+/// The columns of a record by name, tension positive.
+pub fn columns<'py>(py: Python<'py>, record: &Record) -> PyResult<Bound<'py, PyDict>> {
     let rows = record.rows();
     let table = |width: usize, value: &dyn Fn(usize, usize) -> f64| -> Bound<'py, PyArray2<f64>> {
         Array2::from_shape_fn((rows.len(), width), |(row, column)| value(row, column)).to_pyarray(py)

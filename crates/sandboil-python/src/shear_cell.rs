@@ -2,11 +2,13 @@
 
 use crate::{
     errors::CoreError,
+    laboratory::columns,
     material::soil,
-    simulation::{counted, get, numerics, pages, rows, shaped},
+    simulation::{counted, get, numerics, pages, rows},
 };
 use numpy::{PyArray1, PyArray2, PyArray3, ToPyArray};
 use pyo3::{prelude::*, types::PyDict};
+use sandboil_soil::laboratory::Resolution;
 use sandboil_solver as solver;
 use std::time::{Duration, Instant};
 
@@ -25,7 +27,7 @@ impl ShearCell {
     fn new(test: &Bound<'_, PyDict>, threads: usize) -> PyResult<Self> {
         let numerics_dict: Bound<'_, PyDict> = get(test, "numerics")?;
         let gap_memory = get(&numerics_dict, "gap_memory")?;
-        let test = solver::ShearTest {
+        let test = solver::CellTest {
             soil: soil(&get::<Bound<'_, PyDict>>(test, "material")?, gap_memory)?,
             void_ratio: get(test, "void_ratio")?,
             density: get(test, "density")?,
@@ -39,7 +41,11 @@ impl ShearCell {
             inertia: get(test, "inertia")?,
             local_damping: get(test, "local_damping")?,
             strain_limit: get(test, "gamma_stop")?,
-            cycle_limit: get(test, "max_cycles")?,
+            turn_limit: get(test, "turns")?,
+            resolution: Resolution {
+                stress: get(test, "stress_resolution")?,
+                strain: get(test, "strain_resolution")?,
+            },
             every_stress_node: get(test, "every_stress_node")?,
             numerics: numerics(&numerics_dict)?,
         };
@@ -65,33 +71,39 @@ impl ShearCell {
         Ok(outcome.map_err(CoreError)?)
     }
 
-    /// Samples (m, channels) since the last call, tension positive; channels are the fields of the core's `Sample`.
-    fn take_samples<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let samples = self.inner.take_samples();
-        let flat = samples.iter().flat_map(solver::Sample::values).collect();
-        Ok(shaped(flat, (samples.len(), solver::Sample::CHANNELS))?.to_pyarray(py))
+    /// Means over the centre, as a specimen's record.
+    fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        columns(py, self.inner.record())
     }
 
-    /// Steps after which the direction reversed.
-    fn turns<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u64>> {
-        self.inner.turns().to_pyarray(py)
+    /// The largest departures from homogeneous shear, by name.
+    fn departure<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let largest = self.inner.largest_departure();
+        let dict = PyDict::new(py);
+        for (name, value) in [
+            ("gamma_spread", largest.gamma_spread),
+            ("tau_spread", largest.tau_spread),
+            ("sigma_v_spread", largest.vertical_spread),
+            ("volume_strain", largest.volume_strain),
+            ("velocity_deviation", largest.velocity_deviation / largest.edge_speed),
+            ("overshoot", largest.overshoot),
+        ] {
+            dict.set_item(name, value)?;
+        }
+        Ok(dict)
     }
 
-    /// Present shear strain, and steps made.
+    /// Cycles made, and present shear strain.
     #[getter]
-    fn progress(&self) -> (f64, u64) {
-        (self.inner.now().gamma, self.inner.counters().steps)
+    fn progress(&self) -> (f64, f64) {
+        let now = self.inner.now();
+        (now.cycle, now.strain[2])
     }
 
     /// Present time step, s.
     #[getter]
     fn time_step(&self) -> f64 {
         self.inner.time_step()
-    }
-
-    #[getter]
-    fn time(&self) -> f64 {
-        self.inner.time()
     }
 
     #[getter]

@@ -28,7 +28,7 @@ pub use error::SolverError;
 pub use model::{AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, Water, stress_node_offset};
 pub use rayleigh::Rayleigh;
 pub use sandboil_sph::{Period, Vec2};
-pub use shear_cell::{Sample, ShearCell, ShearTest};
+pub use shear_cell::{CellTest, Departure, ShearCell};
 pub use simulation::{
     ACCELERATION_TERM_CONDUCTIVITY, Counters, Gravity, SHAKING_FACTOR, Shaking, Simulation,
 };

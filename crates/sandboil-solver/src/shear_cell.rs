@@ -11,14 +11,19 @@ use crate::{
     geometry::{Geometry, Wall, stress_node_positions},
     model::{Model, Numerics, Region, STRESS_NODES, positive},
     parallel::{Rows, chunks, for_each_chunk},
-    simulation::{CHECK_INTERVAL, Counters, RUNAWAY_SPEED, SHAKING_FACTOR, step_is_outgrown},
+    simulation::{Counters, RUNAWAY_SPEED},
     skeleton::{NodalShare, StressPoint, conservative_force, local_damping, motion},
     soil_field::SoilField,
     timestep::{PressureCoupling, PressureSpectrum, region_limit},
 };
-use sandboil_soil::{Soil, Stress};
+use sandboil_soil::{
+    Soil, Stress,
+    laboratory::{Record, Resolution, Row, cycles},
+};
 use sandboil_sph::{Vec2, WendlandQuintic};
 
+/// Time step over the stability limit, which is found anew after every step: soil has no time to stiffen unseen.
+const TIME_STEP_FACTOR: f64 = 0.9;
 /// Stress that a reversal may pass its target by, over the target.
 const OVERSHOOT: f64 = 1e-3;
 /// Shear strain over which the tangent stiffness is averaged.
@@ -34,7 +39,7 @@ const LEAST_TANGENT: f64 = 0.1;
 
 /// What is tested, and how.
 #[derive(Debug, Clone)]
-pub struct ShearTest {
+pub struct CellTest {
     /// The soil.
     pub soil: Soil,
     /// Void ratio at the start; `None` takes the soil's own.
@@ -61,15 +66,17 @@ pub struct ShearTest {
     pub local_damping: f64,
     /// The test ends when the shear strain reaches this.
     pub strain_limit: f64,
-    /// The test ends after so many cycles.
-    pub cycle_limit: f64,
+    /// The test ends after so many turns.
+    pub turn_limit: usize,
+    /// Changes that are worth a line of the record.
+    pub resolution: Resolution,
     /// Whether stress nodes that no free node feels are computed too.
     pub every_stress_node: bool,
     /// Numerical choices.
     pub numerics: Numerics,
 }
 
-impl ShearTest {
+impl CellTest {
     /// Checks what [`Model::validate`] does not see.
     fn validate(&self) -> Result<(), SolverError> {
         positive("density", self.density)?;
@@ -78,7 +85,6 @@ impl ShearTest {
         positive("strain_step", self.strain_step)?;
         positive("inertia", self.inertia)?;
         positive("strain_limit", self.strain_limit)?;
-        positive("cycle_limit", self.cycle_limit)?;
         positive("spacing", self.spacing)?;
         positive("free_size", self.free_size)?;
         if !(self.local_damping >= 0.0 && self.local_damping < 1.0) {
@@ -168,17 +174,9 @@ fn first_nodes(model: &Model, nodes: usize) -> Model {
     }
 }
 
-/// The state of the centre after a step: means over its stress nodes, and how far it is from homogeneous.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sample {
-    /// Engineering shear strain.
-    pub gamma: f64,
-    /// Shear stress, kPa.
-    pub tau: f64,
-    /// Vertical effective stress, kPa, tension positive.
-    pub vertical: f64,
-    /// Horizontal effective stress, kPa, tension positive.
-    pub horizontal: f64,
+/// How far the centre is from homogeneous shear up to the target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Departure {
     /// Standard deviation of the shear strain.
     pub gamma_spread: f64,
     /// Standard deviation of the shear stress, kPa.
@@ -191,26 +189,33 @@ pub struct Sample {
     pub velocity_deviation: f64,
     /// Speed of Eq. 17 at the edge of the centre, m/s.
     pub edge_speed: f64,
+    /// Shear stress beyond the target, over the target; negative below it.
+    pub overshoot: f64,
 }
 
-impl Sample {
-    /// Number of values.
-    pub const CHANNELS: usize = 10;
+impl Departure {
+    /// Before the test.
+    const NONE: Self = Self {
+        gamma_spread: 0.0,
+        tau_spread: 0.0,
+        vertical_spread: 0.0,
+        volume_strain: 0.0,
+        velocity_deviation: 0.0,
+        edge_speed: 0.0,
+        overshoot: -1.0,
+    };
 
-    /// The values in the order of the fields.
-    pub fn values(&self) -> [f64; Self::CHANNELS] {
-        [
-            self.gamma,
-            self.tau,
-            self.vertical,
-            self.horizontal,
-            self.gamma_spread,
-            self.tau_spread,
-            self.vertical_spread,
-            self.volume_strain,
-            self.velocity_deviation,
-            self.edge_speed,
-        ]
+    /// The larger of each.
+    fn or_larger(self, other: Self) -> Self {
+        Self {
+            gamma_spread: self.gamma_spread.max(other.gamma_spread),
+            tau_spread: self.tau_spread.max(other.tau_spread),
+            vertical_spread: self.vertical_spread.max(other.vertical_spread),
+            volume_strain: self.volume_strain.max(other.volume_strain),
+            velocity_deviation: self.velocity_deviation.max(other.velocity_deviation),
+            edge_speed: self.edge_speed.max(other.edge_speed),
+            overshoot: self.overshoot.max(other.overshoot),
+        }
     }
 }
 
@@ -221,6 +226,10 @@ struct Servo {
     target: f64,
     /// Sense of the present loading.
     direction: f64,
+    /// Turns made.
+    turns: usize,
+    /// Shear stress at the last one, kPa.
+    from: f64,
     /// Shear-strain rate, 1/s.
     rate: f64,
     /// Tangent stiffness of the last strain steps, kPa.
@@ -251,16 +260,23 @@ impl Servo {
         let reversed = self.direction * now >= self.target;
         if reversed {
             self.direction = -self.direction;
+            self.turns += 1;
+            self.from = now;
             self.tangent = shear_modulus;
         }
         reversed
+    }
+
+    /// Cycles so far when the centre carries `tau`, kPa.
+    fn cycle(&self, tau: f64) -> f64 {
+        cycles(self.turns, (self.from, self.direction * self.target), tau)
     }
 }
 
 /// A shear test under way. Arrays that leave are in lattice order, row by row from the bottom.
 #[derive(Debug)]
 pub struct ShearCell {
-    test: ShearTest,
+    test: CellTest,
     /// Nodes sorted: free ones first, then by their distance from these.
     model: Model,
     /// Lattice index of each node.
@@ -277,9 +293,9 @@ pub struct ShearCell {
     spectrum: PressureSpectrum,
     servo: Servo,
     mass: f64,
-    now: Sample,
-    samples: Vec<Sample>,
-    turns: Vec<u64>,
+    now: Row,
+    largest: Departure,
+    record: Record,
     time: f64,
     dt: f64,
     counters: Counters,
@@ -292,7 +308,7 @@ impl ShearCell {
     ///
     /// # Errors
     /// Bad input, a soil that refuses the initial stress, a thread pool that cannot be made.
-    pub fn new(test: ShearTest, threads: usize) -> Result<Self, SolverError> {
+    pub fn new(test: CellTest, threads: usize) -> Result<Self, SolverError> {
         test.validate()?;
         let (model, order, free) = test.model()?;
         let nodes = model.nodes();
@@ -321,6 +337,8 @@ impl ShearCell {
             servo: Servo {
                 target: test.stress_ratio * test.vertical_stress,
                 direction: 1.0,
+                turns: 0,
+                from: 0.0,
                 rate: 0.0,
                 tangent: points[0].shear_modulus,
             },
@@ -329,9 +347,9 @@ impl ShearCell {
             velocity: vec![Vec2::zeros(); nodes],
             shares: vec![NodalShare::default(); points.len()],
             counters: Counters { geometry_builds: 1, ..Counters::default() },
-            now: Sample::default(),
-            samples: Vec::new(),
-            turns: Vec::new(),
+            now: Row { strain: [0.0; 3], stress, void_ratio: None, cycle: 0.0, turns: 0 },
+            largest: Departure::NONE,
+            record: Record::new(test.resolution),
             time: 0.0,
             dt: 0.0,
             test,
@@ -350,15 +368,15 @@ impl ShearCell {
             cell.shares[s] = motion.share(&cell.points[s], cell.geometry.covariance[s], 0.0);
         }
         cell.dt = cell.limit();
-        cell.now = cell.sample();
-        cell.samples.push(cell.now);
+        cell.now = cell.means();
+        cell.record.keep(cell.now);
         Ok(cell)
     }
 
     /// Time step at the safe share of the limit of the present stiffness, s.
     fn limit(&self) -> f64 {
         let stiffest = self.points.iter().map(|point| point.stiffness).fold(0.0, f64::max);
-        SHAKING_FACTOR
+        TIME_STEP_FACTOR
             * region_limit(&self.model, 0, stiffest, PressureCoupling::None, &self.spectrum, None).0
     }
 
@@ -367,13 +385,15 @@ impl ShearCell {
     /// # Errors
     /// [`SolverError::Diverged`] or [`SolverError::Soil`]; the state stays readable.
     pub fn advance(&mut self, steps: usize) -> Result<bool, SolverError> {
-        self.samples.reserve(steps);
         let pool = self.pool.take();
         let outcome = match &pool {
             Some(pool) => pool.install(|| self.run(steps)),
             None => self.run(steps),
         };
         self.pool = pool;
+        if outcome.is_err() {
+            self.record.keep(self.now);
+        }
         outcome
     }
 
@@ -387,17 +407,16 @@ impl ShearCell {
         Ok(self.is_complete())
     }
 
-    /// Whether strain or cycles have reached their limit.
+    /// Whether strain or turns have reached their limit.
     pub fn is_complete(&self) -> bool {
-        // The first turn ends a quarter of a cycle, each further one a half.
-        let cycles = 0.5 * self.turns.len() as f64 - 0.25;
-        self.now.gamma.abs() >= self.test.strain_limit || cycles >= self.test.cycle_limit
+        let [.., gamma] = self.now.strain;
+        gamma.abs() >= self.test.strain_limit || self.servo.turns >= self.test.turn_limit
     }
 
     /// Largest change of the shear-strain rate, 1/s2. The centre, held by shear stress on its edges, departs from a
     /// uniform stress by at most `rho a L^2 / 8` in its middle.
     fn acceleration_limit(&self) -> f64 {
-        let confinement = -0.5 * (self.now.vertical + self.now.horizontal);
+        let confinement = -0.5 * (self.now.stress.xx + self.now.stress.yy);
         let confinement = confinement.max(LEAST_CONFINEMENT * self.test.vertical_stress);
         8.0 * self.test.inertia * confinement / (self.test.density * self.test.free_size.powi(2))
     }
@@ -405,7 +424,7 @@ impl ShearCell {
     fn step(&mut self) -> Result<(), SolverError> {
         let dt = self.dt;
         let fastest = self.test.strain_step / dt;
-        self.servo.rate = self.servo.next_rate(self.now.tau, self.acceleration_limit(), fastest, dt);
+        self.servo.rate = self.servo.next_rate(self.now.stress.xy, self.acceleration_limit(), fastest, dt);
         self.accelerate(dt);
         let rate = self.servo.rate;
         for (v, x) in self.velocity[self.free..].iter_mut().zip(&self.model.position[self.free..]) {
@@ -431,17 +450,20 @@ impl ShearCell {
         self.counters.plastic_updates += self.soil.plastic_points() as u64;
         self.counters.steps += 1;
         self.time += dt;
-        let before = self.now;
-        self.now = self.sample();
-        self.samples.push(self.now);
-        let modulus = self.points[0].shear_modulus;
-        if self.servo.follow(rate * dt, (before.tau, self.now.tau), modulus) {
-            self.turns.push(self.counters.steps);
+        let before = self.now.stress.xy;
+        self.now = self.means();
+        let tau = self.now.stress.xy;
+        let turned = self.servo.follow(rate * dt, (before, tau), self.points[0].shear_modulus);
+        self.now.cycle = self.servo.cycle(tau);
+        self.now.turns = self.servo.turns;
+        self.largest = self.largest.or_larger(self.departure());
+        if turned || self.is_complete() {
+            self.record.keep(self.now);
+        } else {
+            self.record.offer(self.now);
         }
-        if self.counters.steps.is_multiple_of(CHECK_INTERVAL) {
-            self.check()?;
-        }
-        Ok(())
+        self.dt = self.limit();
+        self.check()
     }
 
     /// Velocities of the free nodes, moved by the force of the stress around them (Eq. 6).
@@ -460,50 +482,64 @@ impl ShearCell {
         });
     }
 
-    /// Means and spreads over the centre, in the order of its stress nodes.
-    fn sample(&self) -> Sample {
+    /// Means over the centre's stress nodes, in their order; cycles and turns as they were.
+    fn means(&self) -> Row {
+        let count = STRESS_NODES * self.free;
+        let mut strain = [0.0; 3];
+        let mut stress = Stress { xx: 0.0, yy: 0.0, xy: 0.0, zz: 0.0 };
+        for point in &self.points[..count] {
+            for (sum, part) in strain.iter_mut().zip(point.strain) {
+                *sum += part;
+            }
+            stress.xx += point.stress.xx;
+            stress.yy += point.stress.yy;
+            stress.xy += point.stress.xy;
+            stress.zz += point.stress.zz;
+        }
+        let share = 1.0 / count as f64;
+        let Stress { xx, yy, xy, zz } = stress;
+        let void_ratio: Option<f64> = (0..count).map(|s| self.soil.void_ratio(s)).sum();
+        Row {
+            strain: strain.map(|sum| share * sum),
+            stress: Stress { xx: share * xx, yy: share * yy, xy: share * xy, zz: share * zz },
+            void_ratio: void_ratio.map(|sum| share * sum),
+            ..self.now
+        }
+    }
+
+    /// How far the centre is from homogeneous shear now.
+    pub fn departure(&self) -> Departure {
+        let Row { strain, stress, .. } = self.now;
         let centre = &self.points[..STRESS_NODES * self.free];
-        let count = centre.len() as f64;
-        let mean = |value: &dyn Fn(&StressPoint) -> f64| centre.iter().map(value).sum::<f64>() / count;
-        let spread = |value: &dyn Fn(&StressPoint) -> f64, about: f64| {
-            mean(&|point| (value(point) - about).powi(2)).sqrt()
+        let spread = |difference: &dyn Fn(&StressPoint) -> f64| {
+            let squares = centre.iter().map(|point| difference(point).powi(2)).sum::<f64>();
+            (squares / centre.len() as f64).sqrt()
         };
-        let gamma = mean(&|point| point.strain[2]);
-        let tau = mean(&|point| point.stress.xy);
-        let vertical = mean(&|point| point.stress.yy);
         let rate = self.servo.rate;
         let deviation = self.velocity[..self.free]
             .iter()
             .zip(&self.model.position)
             .map(|(v, x)| (v - self.test.driven(rate, *x)).norm_squared())
             .sum::<f64>();
-        Sample {
-            gamma,
-            tau,
-            vertical,
-            horizontal: mean(&|point| point.stress.xx),
-            gamma_spread: spread(&|point| point.strain[2], gamma),
-            tau_spread: spread(&|point| point.stress.xy, tau),
-            vertical_spread: spread(&|point| point.stress.yy, vertical),
-            volume_strain: spread(&|point| point.strain[0] + point.strain[1], 0.0),
+        Departure {
+            gamma_spread: spread(&|point| point.strain[2] - strain[2]),
+            tau_spread: spread(&|point| point.stress.xy - stress.xy),
+            vertical_spread: spread(&|point| point.stress.yy - stress.yy),
+            volume_strain: spread(&|point| point.strain[0] + point.strain[1]),
             velocity_deviation: (deviation / self.free as f64).sqrt(),
             edge_speed: rate.abs() * 0.5 * self.test.free_size,
+            overshoot: stress.xy.abs() / self.servo.target - 1.0,
         }
     }
 
-    /// Finiteness and stability limit, every few steps.
-    fn check(&mut self) -> Result<(), SolverError> {
+    /// Refuses velocities that are no longer bounded.
+    fn check(&self) -> Result<(), SolverError> {
         for (j, v) in self.velocity[..self.free].iter().enumerate() {
             let speed = v.norm();
             // NaN must take the error branch.
             if !(speed <= RUNAWAY_SPEED) {
                 return Err(self.diverged("velocity", j, speed));
             }
-        }
-        let target = self.limit();
-        if step_is_outgrown(self.dt, target) {
-            self.dt = target;
-            self.counters.time_step_changes += 1;
         }
         Ok(())
     }
@@ -514,19 +550,19 @@ impl ShearCell {
         SolverError::Diverged { quantity, node, x, y, value, time, step }
     }
 
-    /// Samples after each step since the last call; the first of all is the state before the first step.
-    pub fn take_samples(&mut self) -> Vec<Sample> {
-        std::mem::take(&mut self.samples)
+    /// Means over the centre after the steps that were worth a line, strain tension positive.
+    pub fn record(&self) -> &Record {
+        &self.record
     }
 
-    /// Steps after which the direction reversed.
-    pub fn turns(&self) -> &[u64] {
-        &self.turns
-    }
-
-    /// The present sample.
-    pub fn now(&self) -> Sample {
+    /// The present means over the centre.
+    pub fn now(&self) -> Row {
         self.now
+    }
+
+    /// The largest of each departure from homogeneous shear so far.
+    pub fn largest_departure(&self) -> Departure {
+        self.largest
     }
 
     /// Time since the start, s.

@@ -64,6 +64,7 @@ trait Plastic: Debug + Send + Sync {
         outcomes: &mut [Outcome],
         integrator: &Integrator,
     );
+    fn void_ratio(&self, row: usize) -> Option<f64>;
     fn points(&self) -> usize;
     fn state_bytes(&self) -> usize;
 }
@@ -106,6 +107,10 @@ impl<M: SoilModel> Plastic for Rowed<M> {
                 rows.b[k] = motion.share(point, geometry.covariance[s], filter);
             }
         });
+    }
+
+    fn void_ratio(&self, row: usize) -> Option<f64> {
+        self.model.void_ratio(&self.states[row])
     }
 
     fn points(&self) -> usize {
@@ -249,6 +254,15 @@ impl SoilField {
             }
         }
         Ok(total)
+    }
+
+    /// Void ratio at stress node `s`, if its model knows it.
+    pub fn void_ratio(&self, s: usize) -> Option<f64> {
+        let group = self.groups.iter().find(|group| group.rows.contains(&s))?;
+        match &group.law {
+            Law::Elastic(_) => None,
+            Law::Plastic(law) => law.void_ratio(s - group.rows.start),
+        }
     }
 
     fn plastic_groups(&self) -> impl Iterator<Item = &dyn Plastic> {

@@ -7,7 +7,7 @@ engineering. `docs/laboratory.md` tells what each test does.
 
 from . import correlations
 from ._calibration import Calibration, CalibrationWarning, calibrate_hpo, calibration
-from ._cell import CellReport, ShearCell, shear_cell
+from ._cell import CellNodes, CellReport, ShearCell, shear_cell
 from ._modulus import modulus_reduction
 from ._paths import plane_strain_compression, reconsolidation, strain_path, stress_path
 from ._resistance import FactorCurve, ResistanceCurve, crr, crr_curve, k_alpha, k_sigma
@@ -18,6 +18,7 @@ from ._specimen import SoilModel
 __all__ = [
     "Calibration",
     "CalibrationWarning",
+    "CellNodes",
     "CellReport",
     "CompressionTest",
     "CyclicTest",

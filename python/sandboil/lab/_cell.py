@@ -6,30 +6,32 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, StrictBool
 
 from .. import _core
-from .._errors import InvalidInput
-from ..materials import Elastic, PM4Sand
+from .._errors import InvalidInput, SandboilError
+from .._model import Number
+from ..discretise import Floats
+from ..materials import Material
 from ..simulation import LOOK_INTERVAL, MAX_THREADS
-
-Floats = NDArray[np.float64]
-
-# Columns of the core's samples.
-(
-    _GAMMA,
-    _TAU,
-    _SIGMA_YY,
-    _SIGMA_XX,
-    _GAMMA_SPREAD,
-    _TAU_SPREAD,
-    _SIGMA_SPREAD,
-    _VOLUME_STRAIN,
-    _VELOCITY_DEVIATION,
-    _EDGE_SPEED,
-) = range(10)
+from ._arguments import (
+    Count,
+    EarthPressure,
+    Integrator,
+    Limit,
+    Pressure,
+    Ratio,
+    Tolerance,
+    VoidRatio,
+    checked,
+)
+from ._results import CyclicTest, Table
+from ._shear import STRAIN_RESOLUTION, STRESS_RESOLUTION, check_reach, limit_told, shear_columns
+from ._specimen import consolidated
 
 # Fewest nodes along a side of the free centre: with one there is no field whose freedom could show.
 _FEWEST_FREE = 2
@@ -37,10 +39,23 @@ _FEWEST_FREE = 2
 _SUPPORTS = 2.0
 # Support of the kernel over the smoothing length.
 _SUPPORT = 2.0
-# Largest shear strain of a test: beyond it weights of the undeformed lattice would have to be renewed.
-_GAMMA_MAX = 0.2
 # Round-off allowed where a length must be a multiple of the spacing.
 _ROUND_OFF = 1e-6
+
+# Beyond a shear strain of 0.2 the weights of the undeformed lattice would have to be renewed.
+CellLimit = Annotated[Limit, Field(le=0.2)]
+Length = Annotated[Number, Field(gt=0.0, description="m")]
+Density = Annotated[
+    Number,
+    Field(gt=0.0, description="Mg/m3", json_schema_extra={"remedy": "2000 kg/m3 is written 2.0"}),
+]
+# As far as it was tried.
+StrainStep = Annotated[Number, Field(gt=0.0, le=1e-3, description="shear strain")]
+Inertia = Annotated[Number, Field(gt=0.0, le=1.0, description="share of the confining stress")]
+Damping = Annotated[Number, Field(ge=0.0, lt=1.0)]
+Filter = Annotated[Number, Field(ge=0.0)]
+SmoothingRatio = Annotated[Number, Field(ge=1.0, le=3.0, description="h/spacing")]
+Threads = Annotated[int, Field(strict=True, ge=1, le=MAX_THREADS)]
 
 
 @dataclass(frozen=True)
@@ -77,80 +92,75 @@ class CellReport:
     counters: dict[str, int]
 
 
-@dataclass(frozen=True)
-class ShearCell:
-    """Result of :func:`shear_cell`. Stresses are effective, kPa, compression positive.
-
-    Histories (m,) after every step are means over the stress nodes of the free centre, `turns` the samples at
-    which the direction reversed. Fields (n,) or (n, 2) are those of the end, nodes row by row from the
-    bottom, means over a node's stress nodes, NaN where no soil was computed.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CellNodes(Table):
+    """The block at the end of a test: a row for each of its n nodes, row by row from the bottom.
 
     Attributes
     ----------
-    gamma : engineering shear strain
-    tau : shear stress, kPa, with the sign of gamma
-    sigma_v_eff, sigma_h_eff : vertical and horizontal stress, kPa
-    r_u : 1 - sigma_v_eff / sigma_v0
-    cycle : 0.25 at the first peak, 0.75 at the first trough, linear in tau between
-    position, velocity : m and m/s, in the frame of the block's centre
-    node_tau, node_sigma_v_eff, node_sigma_h_eff : stresses, kPa
-    node_r_u, node_gamma : as the histories
-    free : which nodes are
-    report : cost, and departure from homogeneous shear
+    position, velocity : (n, 2), m and m/s, in the frame of the block's centre
+    gamma, tau, sigma_v_eff, sigma_h_eff, r_u : (n,), as the record's; means over a node's stress nodes, NaN
+        where no soil was computed
+    free : (n,), whether it moves freely
     """
 
+    position: Floats
+    velocity: Floats
     gamma: Floats
     tau: Floats
     sigma_v_eff: Floats
     sigma_h_eff: Floats
     r_u: Floats
-    cycle: Floats
-    turns: NDArray[np.int64]
-    position: Floats
-    velocity: Floats
-    node_tau: Floats
-    node_sigma_v_eff: Floats
-    node_sigma_h_eff: Floats
-    node_r_u: Floats
-    node_gamma: Floats
     free: NDArray[np.bool_]
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Every column by its name, vectors by components."""
+        return {
+            **dict(zip(("x", "y"), self.position.T, strict=True)),
+            **dict(zip(("v_x", "v_y"), self.velocity.T, strict=True)),
+            **{name: getattr(self, name) for name in ("gamma", "tau", "sigma_v_eff", "sigma_h_eff", "r_u")},
+            "free": self.free,
+        }
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ShearCell(CyclicTest):
+    """Result of :func:`shear_cell`: a :class:`CyclicTest` of means over the stress nodes of the free centre.
+
+    Attributes
+    ----------
+    nodes : the block at the end
+    report : cost, and departure from homogeneous shear
+    """
+
+    nodes: CellNodes
     report: CellReport
 
-    def cycles_to(self, *, r_u: float | None = None, gamma_sa: float | None = None) -> float:
-        """Cycles until `r_u` or a single-amplitude shear strain `gamma_sa` is reached; NaN if it never is.
 
-        Raises :class:`InvalidInput` unless exactly one of them is given.
-        """
-        if (r_u is None) == (gamma_sa is None):
-            given = {"r_u": r_u, "gamma_sa": gamma_sa}
-            raise InvalidInput("cycles_to", given, "must be given exactly one of r_u and gamma_sa")
-        reached = self.r_u >= r_u if r_u is not None else np.abs(self.gamma) >= gamma_sa
-        return float(self.cycle[np.argmax(reached)]) if reached.any() else math.nan
-
-
+@checked
 def shear_cell(
-    soil: PM4Sand | Elastic,
+    soil: Material,
     *,
-    sigma_v0: float = 101.3,
-    K0: float = 0.5,
-    csr: float,
-    void_ratio: float | None = None,
-    gamma_stop: float = 0.05,
-    max_cycles: float = 60,
-    spacing: float = 0.01,
-    size: float = 0.3,
-    free_size: float = 0.1,
-    density: float = 2.0,
-    strain_step: float = 2e-5,
-    inertia: float = 0.002,
-    local_damping: float = 0.0,
-    velocity_filter: float = 1.0,
-    smoothing_ratio: float = 1.4,
-    integrator: str = "default",
-    integrator_tolerance: float = 1e-4,
-    every_stress_node: bool = False,
-    progress: Callable[[float, int], None] | None = None,
-    threads: int = 1,
+    sigma_v0: Pressure = 101.3,
+    K0: EarthPressure = 0.5,
+    csr: Ratio,
+    void_ratio: VoidRatio = None,
+    gamma_stop: CellLimit = 0.05,
+    max_cycles: Count = 60,
+    spacing: Length = 0.01,
+    size: Length = 0.3,
+    free_size: Length = 0.1,
+    density: Density = 2.0,
+    strain_step: StrainStep = 2e-5,
+    inertia: Inertia = 0.002,
+    local_damping: Damping = 0.0,
+    velocity_filter: Filter = 1.0,
+    smoothing_ratio: SmoothingRatio = 1.4,
+    integrator: Integrator = "default",
+    tolerance: Tolerance = None,
+    every_stress_node: StrictBool = False,
+    progress: Callable[[float, float], None] | None = None,
+    threads: Threads = 1,
 ) -> ShearCell:
     """Constant-volume cyclic simple shear of a block whose centre moves freely.
 
@@ -161,13 +171,9 @@ def shear_cell(
 
     Parameters
     ----------
-    soil : what is tested
-    sigma_v0 : initial vertical effective stress, kPa
-    K0 : horizontal over vertical effective stress at the start
-    csr : shear stress of reversal over `sigma_v0`
-    void_ratio : at the start; None takes the soil's own
+    soil : a material; a model of your own runs in :func:`cyclic_dss` alone
+    sigma_v0, K0, csr, void_ratio, max_cycles, integrator, tolerance : as of :func:`cyclic_dss`
     gamma_stop : shear strain at which the test ends, at most 0.2
-    max_cycles : cycles after which it ends
     spacing, size, free_size : particle spacing, side of the block and of its free centre, m
     density : of the soil, Mg/m3; scales nothing but inertia
     strain_step : largest shear strain of a step
@@ -175,48 +181,28 @@ def shear_cell(
     local_damping : coefficient of Eq. 16
     velocity_filter : strength of the velocity filter, which vanishes where shear is homogeneous
     smoothing_ratio : smoothing length over spacing
-    integrator : "default", "rk4" or "reference"
-    integrator_tolerance : relative error of a sub-step of the default integrator
     every_stress_node : compute also the soil that no free node feels; changes no result
-    progress : called about ten times a second with the present shear strain and the steps made
+    progress : called about ten times a second with the cycles made and the present shear strain
     threads : that share the work; results are the same bits for any number
 
     Raises
     ------
-    InvalidInput : before any work
-    SimulationDiverged : a field is no longer finite
+    InvalidInput : an argument that has no sense, a start that the soil cannot carry, or a shear stress that
+        it can never reach
     """
-    if not isinstance(soil, PM4Sand | Elastic):
-        raise InvalidInput("soil", soil, "must be a sandboil.PM4Sand or sandboil.Elastic")
-    for name, value, most, hint in (
-        ("sigma_v0", sigma_v0, math.inf, "kPa, compression positive"),
-        ("K0", K0, math.inf, None),
-        ("csr", csr, math.inf, "shear stress over sigma_v0, for example 0.147"),
-        ("gamma_stop", gamma_stop, _GAMMA_MAX, "it is a fraction: 5 % is written 0.05"),
-        ("max_cycles", max_cycles, math.inf, None),
-        ("spacing", spacing, math.inf, "m"),
-        ("size", size, math.inf, "m"),
-        ("free_size", free_size, math.inf, "m"),
-        ("density", density, math.inf, "Mg/m3: 2000 kg/m3 is written 2.0"),
-        ("strain_step", strain_step, gamma_stop, "it is a strain, for example 2e-5"),
-        ("inertia", inertia, 1.0, "it is a share of the confining stress, for example 0.002"),
-        ("smoothing_ratio", smoothing_ratio, 3.0, None),
-        ("integrator_tolerance", integrator_tolerance, 1.0, None),
-    ):
-        _within(name, value, most, hint)
-    if void_ratio is not None:
-        _within("void_ratio", void_ratio, math.inf, None)
-    for name, value in (("local_damping", local_damping), ("velocity_filter", velocity_filter)):
-        most = 1.0 if name == "local_damping" else math.inf
-        if not _is_number(value) or value < 0.0 or value >= most:
-            allowed = "must not be negative" if most == math.inf else f"must lie in [0, {most:g})"
-            raise InvalidInput(name, value, allowed)
-    if integrator not in ("default", "rk4", "reference"):
-        raise InvalidInput("integrator", integrator, "must be 'default', 'rk4' or 'reference'")
-    if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= MAX_THREADS:
-        raise InvalidInput("threads", threads, f"must be a whole number from 1 to {MAX_THREADS}")
-    _lattice(spacing, size, free_size, smoothing_ratio)
-
+    where = "lab.shear_cell"
+    specimen = consolidated(
+        where,
+        soil,
+        sigma_v0=sigma_v0,
+        K0=K0,
+        static_shear_ratio=0.0,
+        void_ratio=void_ratio,
+        integrator=integrator,
+        tolerance=tolerance,
+    )
+    check_reach(f"{where}.csr", soil, specimen, np.array([csr]), drained=False)
+    _check_lattice(where, spacing, size, free_size, smoothing_ratio)
     core = _core.ShearCell(
         {
             "material": soil.core(),
@@ -232,7 +218,9 @@ def shear_cell(
             "inertia": inertia,
             "local_damping": local_damping,
             "gamma_stop": gamma_stop,
-            "max_cycles": float(max_cycles),
+            "turns": 2 * max_cycles,
+            "stress_resolution": STRESS_RESOLUTION * sigma_v0,
+            "strain_resolution": STRAIN_RESOLUTION,
             "every_stress_node": every_stress_node,
             "numerics": {
                 "operators": "conservative",
@@ -242,31 +230,61 @@ def shear_cell(
                 "acceleration_term": "auto",
                 "geometry_strain_limit": None,
                 "integrator": integrator,
-                "integrator_tolerance": integrator_tolerance,
+                "integrator_tolerance": tolerance,
                 "gap_memory": False,
             },
         },
         threads,
     )
     start = time.perf_counter()
-    while not core.advance(seconds=LOOK_INTERVAL):
-        if progress is not None:
-            progress(*core.progress)
-    return _result(core, time.perf_counter() - start, sigma_v0, csr * sigma_v0)
+    failure: SandboilError | None = None
+    try:
+        while not core.advance(seconds=LOOK_INTERVAL):
+            if progress is not None:
+                progress(*core.progress)
+    except SandboilError as error:
+        failure = error
+    record, counters = core.record(), core.counters()
+    nodes = _nodes(core, sigma_v0)
+    turns = record["turns"]
+    finished = f"max_cycles = {max_cycles} were done"
+    ended = finished if turns[-1] == 2 * max_cycles else limit_told(gamma_stop, turns)
+    return ShearCell(
+        **shear_columns(record),
+        cycle=record["cycle"],
+        turns=turns,
+        sigma_v0=sigma_v0,
+        drained=False,
+        complete=failure is None,
+        ended=ended if failure is None else str(failure),
+        nodes=nodes,
+        report=CellReport(
+            steps=counters["steps"],
+            time_step=core.time_step,
+            wall_time=time.perf_counter() - start,
+            stress_nodes=2 * len(nodes.free),
+            computed_stress_nodes=core.computed_stress_nodes,
+            **core.departure(),
+            counters=counters,
+        ),
+    )
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+def _nodes(core: _core.ShearCell, sigma_v0: float) -> CellNodes:
+    stress, strain = core.stress().mean(axis=1), core.strain().mean(axis=1)
+    return CellNodes(
+        position=core.position(),
+        velocity=core.velocity(),
+        gamma=strain[:, 2],
+        tau=stress[:, 2],
+        sigma_v_eff=-stress[:, 1],
+        sigma_h_eff=-stress[:, 0],
+        r_u=1.0 + stress[:, 1] / sigma_v0,
+        free=core.is_free(),
+    )
 
 
-def _within(name: str, value: float, most: float, hint: str | None) -> None:
-    """Refuse what is not a finite number above zero, up to `most`."""
-    if not _is_number(value) or not 0.0 < value <= most:
-        allowed = "must be positive" if most == math.inf else f"must lie in (0, {most:g}]"
-        raise InvalidInput(name, value, allowed, hint)
-
-
-def _lattice(spacing: float, size: float, free_size: float, smoothing_ratio: float) -> None:
+def _check_lattice(where: str, spacing: float, size: float, free_size: float, smoothing_ratio: float) -> None:
     """Refuse a block that the spacing does not divide or that has no room around its centre."""
     counts = []
     for name, length in (("size", size), ("free_size", free_size)):
@@ -274,13 +292,16 @@ def _lattice(spacing: float, size: float, free_size: float, smoothing_ratio: flo
         if abs(count - round(count)) > _ROUND_OFF * count:
             nearest = max(round(count), 1) * spacing
             raise InvalidInput(
-                name, length, f"must be a multiple of spacing = {spacing:g}", f"try {nearest:g}"
+                f"{where}.{name}", length, f"must be a multiple of spacing = {spacing:g}", f"try {nearest:g}"
             )
         counts.append(round(count))
     across, free = counts
     if free < _FEWEST_FREE:
         raise InvalidInput(
-            "free_size", free_size, f"must be at least {_FEWEST_FREE} spacings", "take a smaller spacing"
+            f"{where}.free_size",
+            free_size,
+            f"must be at least {_FEWEST_FREE} spacings",
+            "take a smaller spacing",
         )
     # From the outermost free node to the first one missing outside, in spacings.
     room = 0.5 * (across - free) + 1.0
@@ -288,68 +309,8 @@ def _lattice(spacing: float, size: float, free_size: float, smoothing_ratio: flo
     if (across - free) % 2 or room < needed:
         least = free + 2 * math.ceil(needed - 1.0)
         raise InvalidInput(
-            "size",
+            f"{where}.size",
             size,
             f"must exceed free_size by an even number of spacings, at least {least - free}",
             f"try {least * spacing:g}, or a smaller spacing",
         )
-
-
-def _result(core: _core.ShearCell, wall_time: float, sigma_v0: float, target: float) -> ShearCell:
-    samples = core.take_samples()
-    turns = core.turns().astype(np.int64)
-    tau = samples[:, _TAU]
-    stress, strain = core.stress().mean(axis=1), core.strain().mean(axis=1)
-    counters = core.counters()
-    largest = samples.max(axis=0)
-    report = CellReport(
-        steps=counters["steps"],
-        time_step=core.time_step,
-        wall_time=wall_time,
-        stress_nodes=2 * len(stress),
-        computed_stress_nodes=core.computed_stress_nodes,
-        gamma_spread=float(largest[_GAMMA_SPREAD]),
-        tau_spread=float(largest[_TAU_SPREAD]),
-        sigma_v_spread=float(largest[_SIGMA_SPREAD]),
-        volume_strain=float(largest[_VOLUME_STRAIN]),
-        velocity_deviation=float(largest[_VELOCITY_DEVIATION] / largest[_EDGE_SPEED]),
-        overshoot=float(np.abs(tau).max() / target - 1.0),
-        counters=counters,
-    )
-    return ShearCell(
-        gamma=np.ascontiguousarray(samples[:, _GAMMA]),
-        tau=np.ascontiguousarray(tau),
-        sigma_v_eff=-samples[:, _SIGMA_YY],
-        sigma_h_eff=-samples[:, _SIGMA_XX],
-        r_u=1.0 + samples[:, _SIGMA_YY] / sigma_v0,
-        cycle=cycles(tau, turns, target),
-        turns=turns,
-        position=core.position(),
-        velocity=core.velocity(),
-        node_tau=stress[:, 2],
-        node_sigma_v_eff=-stress[:, 1],
-        node_sigma_h_eff=-stress[:, 0],
-        node_r_u=1.0 + stress[:, 1] / sigma_v0,
-        node_gamma=strain[:, 2],
-        free=core.is_free(),
-        report=report,
-    )
-
-
-def cycles(tau: Floats, turns: NDArray[np.int64], target: float) -> Floats:
-    """Cycles done at every sample: 0.25 at the first turn, half a cycle more at each further one.
-
-    Between turns by the share of the way that `tau` has gone; after the last one the way leads to the
-    opposite `target` (kPa).
-    """
-    counted: Floats = np.zeros_like(tau)
-    ends = [0, *(int(turn) for turn in turns)]
-    for k, begin in enumerate(ends):
-        last = k == len(turns)
-        end = len(tau) - 1 if last else ends[k + 1]
-        goal = (target if k % 2 == 0 else -target) if last else tau[end]
-        before, length = (0.0, 0.25) if k == 0 else (0.5 * k - 0.25, 0.5)
-        way = (tau[begin : end + 1] - tau[begin]) / (goal - tau[begin])
-        counted[begin : end + 1] = before + length * np.clip(way, 0.0, 1.0)
-    # Stress that wavers on its way does not undo what is done.
-    return np.maximum.accumulate(counted)

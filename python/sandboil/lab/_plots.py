@@ -51,7 +51,7 @@ def cyclic(test: CyclicTest, reference: object | None) -> Figure:
     panels = [
         ("sigma_v_eff", "tau"),
         ("gamma", "tau"),
-        ("cycle", "eps_v" if test.eps_v.any() else "r_u"),
+        ("cycle", "eps_v" if test.drained else "r_u"),
         ("cycle", "gamma"),
     ]
     return _drawn(test, reference, panels, (2, 2))
@@ -62,7 +62,7 @@ def monotonic(test: ShearTest, reference: object | None) -> Figure:
     panels = [
         ("gamma", "tau"),
         ("sigma_v_eff", "tau"),
-        ("gamma", "eps_v" if test.eps_v.any() else "r_u"),
+        ("gamma", "eps_v" if test.drained else "r_u"),
     ]
     return _drawn(test, reference, panels, (1, 3))
 

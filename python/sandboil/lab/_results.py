@@ -70,6 +70,7 @@ class ShearTest(Record):
     eps_v : volumetric strain since the start, 1, contraction positive
     void_ratio : nan for models that have none
     sigma_v0 : vertical effective stress at the start, kPa
+    drained : whether the vertical effective stress was held, not the volume
     specimen : the soil after the test, or None where it is not at hand
     """
 
@@ -80,6 +81,7 @@ class ShearTest(Record):
     eps_v: Floats
     void_ratio: Floats
     sigma_v0: float
+    drained: bool
     specimen: _core.Specimen | None = field(default=None, repr=False)
 
     @property

@@ -111,19 +111,18 @@ def cyclic_dss(
             )
         turns = [("strain", float(value)) for value in turning]
     else:
-        _check_reach(f"{where}.{name}", soil, specimen, turning, drained)
+        check_reach(f"{where}.{name}", soil, specimen, turning, drained=drained)
         turns = [("stress", float(value) * sigma_v0) for value in turning]
     record, ending = sheared(
         specimen, turns, count=count, drained=drained, strain_limit=gamma_stop, sigma_v0=sigma_v0
     )
-    limit = f"the shear strain reached gamma_stop = {gamma_stop:g}"
-    if record["turns"][-1] == 0:
-        limit += " before the first turn"
+    limit = limit_told(gamma_stop, record["turns"])
     return CyclicTest(
         **shear_columns(record),
         cycle=record["cycle"],
         turns=record["turns"],
         sigma_v0=sigma_v0,
+        drained=drained,
         specimen=specimen,
         complete=ending in ("complete", "strain limit"),
         ended={"complete": finished, "strain limit": limit}.get(ending, ending),
@@ -158,6 +157,7 @@ def monotonic_dss(
     return ShearTest(
         **shear_columns(record),
         sigma_v0=sigma_v0,
+        drained=drained,
         specimen=specimen,
         complete=ending == "complete",
         ended=f"gamma_max = {gamma_max:g} was reached" if ending == "complete" else ending,
@@ -200,6 +200,12 @@ def shear_columns(record: dict[str, NDArray[Any]]) -> dict[str, Any]:
     }
 
 
+def limit_told(gamma_stop: float, turns: NDArray[np.int64]) -> str:
+    """How a test ended that reached its largest strain."""
+    told = f"the shear strain reached gamma_stop = {gamma_stop:g}"
+    return told if turns[-1] else f"{told} before the first turn"
+
+
 def _check_alternation(path: str, begin: float, turning: Floats) -> None:
     strokes = np.sign(np.diff(turning, prepend=begin))
     wrong = np.flatnonzero((strokes == 0.0) | (strokes == np.append(0.0, strokes[:-1])))
@@ -212,7 +218,7 @@ def _check_alternation(path: str, begin: float, turning: Floats) -> None:
         )
 
 
-def _check_reach(path: str, soil: Soil, specimen: _core.Specimen, turning: Floats, drained: bool) -> None:
+def check_reach(path: str, soil: Soil, specimen: _core.Specimen, turning: Floats, *, drained: bool) -> None:
     """Refuse turning points that PM4Sand can never reach: others are found out by the test itself."""
     if not isinstance(soil, PM4Sand):
         return

@@ -12,7 +12,7 @@ mod shear;
 
 pub use path::Path;
 pub use point::Point;
-pub use record::{Record, Resolution, Row};
+pub use record::{Record, Resolution, Row, cycles};
 pub use shear::{Shear, Turn, Turns};
 
 use crate::{Integrator, SoilError, SoilModel, Stress, UpdateReport};

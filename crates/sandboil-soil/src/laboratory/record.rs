@@ -18,6 +18,14 @@ pub struct Row {
     pub turns: usize,
 }
 
+/// Cycles so far after `turns` turns, where the quantity that is turned has come to `value` on its way `from` the last
+/// turn `to` the next. Soil may soften on the way: cycles never go back beyond the last turn.
+pub fn cycles(turns: usize, (from, to): (f64, f64), value: f64) -> f64 {
+    let (begun, length) = if turns == 0 { (0.0, 0.25) } else { (0.5 * turns as f64 - 0.25, 0.5) };
+    let share = if to == from { 1.0 } else { ((value - from) / (to - from)).clamp(0.0, 1.0) };
+    begun + share * length
+}
+
 /// Changes that are worth a line: rows closer than all of these to the last one written are left out, except turns
 /// and the end.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,14 +62,14 @@ impl Record {
     }
 
     /// Writes a line whatever its distance, once.
-    pub(super) fn keep(&mut self, row: Row) {
+    pub fn keep(&mut self, row: Row) {
         if self.rows.last() != Some(&row) {
             self.rows.push(row);
         }
     }
 
     /// Writes a line if it is far enough from the last one.
-    pub(super) fn offer(&mut self, row: Row) {
+    pub fn offer(&mut self, row: Row) {
         let Some(last) = self.rows.last() else {
             self.rows.push(row);
             return;

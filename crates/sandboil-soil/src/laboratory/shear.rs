@@ -3,6 +3,7 @@
 use super::{
     Ending, Record, Specimen, Watch,
     control::{Compliance, Failure, Prescribed},
+    record::cycles,
 };
 use crate::{
     SoilError,
@@ -95,8 +96,6 @@ struct Leg {
     direction: f64,
     /// Value at the last turn of the quantity that is turned.
     from: f64,
-    begun: f64,
-    length: f64,
     turns: usize,
 }
 
@@ -112,11 +111,9 @@ impl Leg {
         self.turn.value()
     }
 
-    /// Cycles at the present value. Soil may soften on the way: cycles never go back beyond the last turn.
+    /// Cycles at the present value.
     fn cycle(&self, value: f64) -> f64 {
-        let distance = self.target() - self.from;
-        let share = if distance == 0.0 { 1.0 } else { ((value - self.from) / distance).clamp(0.0, 1.0) };
-        self.begun + share * self.length
+        cycles(self.turns, (self.from, self.target()), value)
     }
 }
 
@@ -136,14 +133,7 @@ impl Specimen {
         let mut compliance = Compliance::elastic(self.point.moduli(), prescribed.by_stress);
         let mut turns = 0;
         while let Some(turn) = test.turns.get(turns) {
-            let mut leg = Leg {
-                turn,
-                direction: 1.0,
-                from: 0.0,
-                begun: if turns == 0 { 0.0 } else { 0.5 * turns as f64 - 0.25 },
-                length: if turns == 0 { 0.25 } else { 0.5 },
-                turns,
-            };
+            let mut leg = Leg { turn, direction: 1.0, from: 0.0, turns };
             leg.from = leg.value(self);
             leg.direction = (leg.target() - leg.from).signum();
             let ending = self.shear_leg(test, &leg, start, &prescribed, &mut compliance, record, &mut watch);
@@ -152,7 +142,7 @@ impl Specimen {
                 return ending;
             }
             turns += 1;
-            record.keep(self.row(leg.begun + leg.length, turns));
+            record.keep(self.row(leg.cycle(leg.target()), turns));
         }
         Ending::Complete
     }
