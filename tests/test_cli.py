@@ -254,6 +254,15 @@ def test_a_strain_path_gives_stresses_as_csv(tmp_path: Path) -> None:
     assert out.read_text() == told.stdout
 
 
+def test_the_shear_cell_is_told_as_a_test_at_one_point(tmp_path: Path) -> None:
+    out = tmp_path / "cell.csv"
+    told = called("lab", "cell", *SAND, "--csr", 0.3, "--spacing", 0.02, "--max-cycles", 1, "--out", out)
+    assert "largest spread" in told.stdout
+    assert "max_cycles = 1 were done" in told.stdout
+    assert out.read_text(encoding="utf-8").startswith("gamma,tau,sigma_v_eff")
+    assert "lab.shear_cell.size" in refused("lab", "cell", *SAND, "--csr", 0.3, "--spacing", 0.025)
+
+
 def test_calibration_prints_a_material_that_the_laboratory_and_a_scene_take(tmp_path: Path) -> None:
     out, picture = tmp_path / "sand.toml", tmp_path / "curve.png"
     told = called("lab", "calibrate", "--spt", 6, "--G0", 470, "--out", out, "--plot", picture)

@@ -1,4 +1,4 @@
-"""The commands `sandboil lab ...`: tests on one material point."""
+"""The commands `sandboil lab ...`: tests on one material point, and on a block of particles."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .materials import Material, PM4Sand, material
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-app = typer.Typer(help="Test a soil at one point.", no_args_is_help=True)
+app = typer.Typer(help="Test a soil at one point, or as a block of particles.", no_args_is_help=True)
 
 DrOption = Annotated[float | None, typer.Option("--Dr", help="PM4Sand: relative density, fraction.")]
 G0Option = Annotated[float | None, typer.Option("--G0", help="PM4Sand: shear modulus coefficient.")]
@@ -35,6 +35,8 @@ BiasOption = Annotated[float, typer.Option(help="Static shear stress over sigma_
 VoidRatioOption = Annotated[float | None, typer.Option(help="At the start; default the soil's own.")]
 IntegratorOption = Annotated[Integrator, typer.Option(help="Of rate-type models.")]
 PlotOption = Annotated[Path | None, typer.Option(help="Picture, PNG, PDF or SVG.")]
+StopOption = Annotated[float, typer.Option(help="Shear strain that ends a cyclic test.")]
+MaxCyclesOption = Annotated[int, typer.Option(help="Cycles that end a cyclic test.")]
 CyclesOption = Annotated[float, typer.Option(help="Uniform cycles, counted by halves.")]
 OutOption = Annotated[Path | None, typer.Option(help="CSV for the record.")]
 
@@ -70,8 +72,8 @@ def dss(
     K0: K0Option = 0.5,
     static_shear_ratio: BiasOption = 0.0,
     void_ratio: VoidRatioOption = None,
-    gamma_stop: Annotated[float, typer.Option(help="Shear strain that ends a cyclic test.")] = 0.05,
-    max_cycles: Annotated[int, typer.Option(help="Cycles that end a cyclic test.")] = 60,
+    gamma_stop: StopOption = 0.05,
+    max_cycles: MaxCyclesOption = 60,
     gamma_max: Annotated[float, typer.Option(help="Shear strain that ends a monotonic test.")] = 0.10,
     integrator: IntegratorOption = "default",
     out: OutOption = None,
@@ -96,6 +98,59 @@ def dss(
     else:
         test = lab.cyclic_dss(tested, csr=csr, gamma_stop=gamma_stop, max_cycles=max_cycles, **common)
         lines = _cyclic_lines(test)
+    _conclude(test, lines, out, plot)
+
+
+@app.command()
+def cell(
+    csr: Annotated[float, typer.Option(help="Cyclic shear stress over sigma_v0.")],
+    Dr: DrOption = None,
+    G0: G0Option = None,
+    hpo: HpoOption = None,
+    soil: SoilOption = None,
+    sigma_v0: SigmaOption = 101.3,
+    K0: K0Option = 0.5,
+    void_ratio: VoidRatioOption = None,
+    gamma_stop: StopOption = 0.05,
+    max_cycles: MaxCyclesOption = 60,
+    spacing: Annotated[float, typer.Option(help="Between particles, m.")] = 0.01,
+    inertia: Annotated[float, typer.Option(help="Its share of the confining stress: accuracy.")] = 0.002,
+    integrator: IntegratorOption = "default",
+    threads: Annotated[int, typer.Option(help="Threads; the results do not depend on their number.")] = 1,
+    out: OutOption = None,
+    plot: PlotOption = None,
+) -> None:
+    """Cyclic simple shear of a block of particles with a free centre, in minutes; prints as dss does."""
+    # It loads slowly, and no other test of the laboratory is long enough for it.
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
+        row = bar.add_task("cycles", total=max_cycles)
+
+        def told(cycle: float, gamma: float) -> None:
+            bar.update(row, completed=cycle, description=f"{cycle:.2f} cycles, {100.0 * gamma:+.2f} %")
+
+        test = lab.shear_cell(
+            soil_of(soil, Dr=Dr, G0=G0, hpo=hpo),
+            csr=csr,
+            sigma_v0=sigma_v0,
+            K0=K0,
+            void_ratio=void_ratio,
+            gamma_stop=gamma_stop,
+            max_cycles=max_cycles,
+            spacing=spacing,
+            inertia=inertia,
+            integrator=integrator,
+            progress=told,
+            threads=threads,
+        )
+    spread = f"{100.0 * test.report.gamma_spread:.2g} % strain, {test.report.tau_spread:.2g} kPa"
+    _conclude(test, [*_cyclic_lines(test), f"{'largest spread':<28}{spread}"], out, plot)
+
+
+def _conclude(test: lab.ShearTest, lines: list[str], out: Path | None, plot: Path | None) -> None:
     typer.echo("\n".join([*lines, f"{'ended':<28}{test.ended}"]))
     if out is not None:
         _write(out, test.columns())
