@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import typing
-from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, ClassVar, Literal, ParamSpec, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationError, create_model
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
@@ -31,7 +33,9 @@ def _as_list(value: object) -> object:
 
 Number = Annotated[float, BeforeValidator(as_float)]
 
-_Item = typing.TypeVar("_Item")
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+_Item = TypeVar("_Item")
 Many = Annotated[Sequence[_Item], BeforeValidator(_as_list), AfterValidator(tuple)]
 """Any sequence on entry, a tuple ever after: equal scenes compare equal and cannot be changed."""
 
@@ -202,3 +206,43 @@ def _tags(field: FieldInfo | None) -> list[str]:
         for m in members
         if isinstance(m, type) and issubclass(m, BaseModel) and "kind" in m.model_fields
     ]
+
+
+def checked(owner: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
+    """Check a function's arguments against its own annotations, and refuse them as those of a scene are.
+
+    The function raises :class:`InvalidInput` with a path such as ``lab.cyclic_dss.csr``, which begins with
+    `owner`; an unknown keyword is told with the nearest right one.
+    """
+
+    def decorated(function: Callable[_P, _R]) -> Callable[_P, _R]:
+        @functools.cache
+        def arguments() -> type[Model]:
+            # Made when the function is first called: whoever only runs scenes does not wait for it.
+            hints = typing.get_type_hints(function, include_extras=True)
+            parameters = inspect.signature(function).parameters.values()
+            fields: dict[str, Any] = {
+                parameter.name: (
+                    hints[parameter.name],
+                    ... if parameter.default is inspect.Parameter.empty else parameter.default,
+                )
+                for parameter in parameters
+            }
+            made = create_model(function.__name__, __base__=Model, **fields)
+            made._label = f"{owner}.{function.__name__}"
+            made._positional = tuple(
+                parameter.name
+                for parameter in parameters
+                if parameter.kind is not inspect.Parameter.KEYWORD_ONLY
+            )
+            return made
+
+        @functools.wraps(function)
+        def checking(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+            valid = arguments()(*args, **kwargs)
+            given = {name: getattr(valid, name) for name in type(valid).model_fields}
+            return typing.cast(Callable[..., _R], function)(**given)
+
+        return checking
+
+    return decorated

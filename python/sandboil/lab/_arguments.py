@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import operator
-import typing
-from collections.abc import Callable
-from typing import Annotated, Any, Literal, ParamSpec, TypeVar
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BeforeValidator, Field, PlainValidator, create_model
+from pydantic import BeforeValidator, Field, PlainValidator
 
-from .._model import Model, Number
+from .._model import Number
+from .._model import checked as _checked
 from ..discretise import Floats
 from . import _specimen
 from ._results import ShearTest
-
-_P = ParamSpec("_P")
-_R = TypeVar("_R")
 
 # Largest integrator tolerance at which cycle counts are unbiased (docs/theory/pm4sand.md), as in a scene.
 _TOLERANCE_MAX = 1.0e-4
@@ -46,7 +40,7 @@ def _as_integer(value: object) -> int:
     try:
         if isinstance(value, (bool, np.bool_)):
             raise TypeError
-        return operator.index(typing.cast(Any, value))
+        return operator.index(cast(Any, value))
     except TypeError:
         raise ValueError("must be a whole number") from None
 
@@ -135,37 +129,4 @@ Amplitudes = Annotated[ArrayLike, PlainValidator(_as_amplitudes)]
 Tested = Annotated[ShearTest, PlainValidator(_as_tested)]
 Stress = Annotated[ArrayLike, PlainValidator(_as_stress)]
 
-
-def checked(test: Callable[_P, _R]) -> Callable[_P, _R]:
-    """A test whose arguments are checked against its own annotations, and refused as those of a scene are.
-
-    Raises :class:`InvalidInput` with a path such as ``lab.cyclic_dss.csr``; an unknown keyword is told with
-    the nearest right one.
-    """
-
-    @functools.cache
-    def arguments() -> type[Model]:
-        # Made when the test is first called: whoever only runs scenes does not wait for it.
-        hints = typing.get_type_hints(test, include_extras=True)
-        parameters = inspect.signature(test).parameters.values()
-        fields: dict[str, Any] = {
-            parameter.name: (
-                hints[parameter.name],
-                ... if parameter.default is inspect.Parameter.empty else parameter.default,
-            )
-            for parameter in parameters
-        }
-        made = create_model(test.__name__, __base__=Model, **fields)
-        made._label = f"lab.{test.__name__}"
-        made._positional = tuple(
-            parameter.name for parameter in parameters if parameter.kind is not inspect.Parameter.KEYWORD_ONLY
-        )
-        return made
-
-    @functools.wraps(test)
-    def checking(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-        valid = arguments()(*args, **kwargs)
-        given = {name: getattr(valid, name) for name in type(valid).model_fields}
-        return typing.cast(Callable[..., _R], test)(**given)
-
-    return checking
+checked = _checked("lab")
