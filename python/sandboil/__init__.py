@@ -32,6 +32,7 @@ from .scene import (
     polygon,
 )
 from .simulation import Simulation
+from .site import HalfSpace, ModulusCurve, SiteLayer, SiteProfile
 
 __all__ = [
     "Box",
@@ -40,8 +41,10 @@ __all__ = [
     "DruckerPrager",
     "Elastic",
     "Gravity",
+    "HalfSpace",
     "History",
     "InvalidInput",
+    "ModulusCurve",
     "MohrCoulomb",
     "Motion",
     "MotionSpec",
@@ -63,6 +66,8 @@ __all__ = [
     "Shaking",
     "Simulation",
     "SimulationDiverged",
+    "SiteLayer",
+    "SiteProfile",
     "Summary",
     "Surface",
     "TotalStress",

@@ -25,6 +25,7 @@ from .materials import Elastic, Material, NonNegative, PM4Sand, Positive
 if TYPE_CHECKING:
     from .motion import Motion
     from .plan import Plan
+    from .site._profile import CurveChoice, SiteProfile
 
 # Coordinates closer than this are the same point, m: far below any spacing, far above round-off of a
 # kilometre-wide section.
@@ -42,6 +43,10 @@ MAX_CELLS = 10_000_000
 
 # Most frames of a run: a frame holds every field of every node.
 MAX_FRAMES = 100_000
+
+# Thickness of the layers that a profile is divided into, m: a fifth of the wavelength at 20 Hz in soil of
+# 100 m/s.
+DEFAULT_LAYER = 1.0
 
 # Relative mismatch up to which densities given twice are the same: they come with three to four digits.
 DENSITY_TOLERANCE = 1.0e-3
@@ -984,6 +989,30 @@ class Scene(Model):
         from .plan import plan
 
         return plan(self)
+
+    def profile(
+        self,
+        x: float | None = None,
+        *,
+        curves: CurveChoice = "darendeli",
+        thickness: float = DEFAULT_LAYER,
+    ) -> SiteProfile:
+        """The ground at `x` as level layers on a half-space, for equivalent-linear analysis.
+
+        Each layer has the unit weight and the small-strain stiffness that its soil has at rest, at the
+        geostatic stress in its middle. The half-space is the base of the first shaking stage. Linearly
+        elastic soils stay linear and undamped.
+
+        Parameters
+        ----------
+        x : m; default the middle of the section
+        curves : stiffness and damping over strain: "darendeli", the published mean for sand (2001), or
+            "material", those of the soil model itself, which takes seconds per layer
+        thickness : of a layer at most, m, but not less than a particle's spacing
+        """
+        from .site._profile import profile
+
+        return profile(self, x, curves=curves, thickness=thickness)
 
     # Files.
 

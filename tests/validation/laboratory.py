@@ -113,22 +113,9 @@ def path_difference(name: str, integrator: str = "reference") -> Floats:
 
 
 def darendeli(gamma: Floats, sigma_m: float) -> dict[str, Floats]:
-    """Mean curves of Darendeli (2001) for clean sand at the mean effective stress `sigma_m`, kPa:
-    10 cycles, 1 Hz."""
-    atmospheres = sigma_m / 101.325
-    curvature, percent = 0.919, 100.0 * gamma
-    strain = 0.0352 * atmospheres**0.3483
-    ratio = 1.0 / (1.0 + (percent / strain) ** curvature)
-    quotient = np.log((percent + strain) / strain)
-    loop = 4.0 * (percent - strain * quotient) / (percent**2 / (percent + strain)) - 2.0
-    masing = 100.0 / np.pi * loop
-    c1 = -1.1143 * curvature**2 + 1.8618 * curvature + 0.2523
-    c2 = 0.0805 * curvature**2 - 0.0710 * curvature - 0.0095
-    c3 = -0.0005 * curvature**2 + 0.0002 * curvature + 0.0003
-    scaled = (0.6329 - 0.0057 * np.log(10.0)) * ratio**0.1
-    least = 0.8005 * atmospheres**-0.2889
-    damping = 0.01 * (least + scaled * (c1 * masing + c2 * masing**2 + c3 * masing**3))
-    return {"gamma": gamma, "G_ratio": ratio, "damping": damping}
+    """Mean curves of Darendeli (2001) for clean sand at the mean effective stress `sigma_m`, kPa."""
+    curve = sb.site.darendeli(sigma_m, strains=gamma.tolist())
+    return {"gamma": gamma, "G_ratio": np.array(curve.G_ratio), "damping": np.array(curve.damping)}
 
 
 PAGE, PICTURES = ROOT / "docs" / "validation.md", ROOT / "docs" / "figures"

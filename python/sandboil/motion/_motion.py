@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, cast, get_args
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +27,9 @@ from ._series import (
     positive,
 )
 from ._spectrum import ResponseSpectrum, response_spectrum
+
+if TYPE_CHECKING:
+    from ..site import SiteProfile
 
 Kind = Literal["outcrop", "within", "upgoing"]
 # Fractions of the Arias intensity that bound the significant duration.
@@ -394,6 +398,22 @@ class Motion:
         at the end: `baseline_corrected` takes it away.
         """
         return self._changed(butterworth(self._samples, self.dt, low, high, order))
+
+    def deconvolved(self, profile: SiteProfile, **options: Any) -> Motion:
+        """The outcrop motion at the base of the ground on which this one was recorded.
+
+        By equivalent-linear analysis; :func:`sandboil.site.deconvolution` takes the same arguments and tells
+        strains and stiffnesses too. The record counts as taken at the surface unless `at="base"`.
+
+        Warns with :class:`DeconvolutionWarning` where the motion is doubtful. Raises :class:`InvalidInput`.
+        """
+        # The analysis needs motions: they know of it only when asked for it.
+        from ..site import DeconvolutionWarning, deconvolution
+
+        found = deconvolution(self, profile, **options)
+        for doubt in found.doubts:
+            warnings.warn(doubt, DeconvolutionWarning, stacklevel=2)
+        return found.motion
 
     # Files
 

@@ -1,0 +1,21 @@
+"""Level ground as equivalent-linear analysis sees it, and deconvolution of motions to its base.
+
+Theory and sources: docs/theory/motion.md.
+"""
+
+from ._deconvolution import Deconvolution, DeconvolutionWarning, Place, deconvolution
+from ._profile import CurveChoice, HalfSpace, ModulusCurve, SiteLayer, SiteProfile, darendeli, measured
+
+__all__ = [
+    "CurveChoice",
+    "Deconvolution",
+    "DeconvolutionWarning",
+    "HalfSpace",
+    "ModulusCurve",
+    "Place",
+    "SiteLayer",
+    "SiteProfile",
+    "darendeli",
+    "deconvolution",
+    "measured",
+]
