@@ -335,6 +335,20 @@ def test_motion_convert_scales_filters_and_changes_the_form(record: Path, tmp_pa
     assert "must be stated" in refused("motion", "info", unitless(tmp_path))
 
 
+def test_motion_deconvolve_writes_the_base_s_motion_and_tells_strains(
+    scene_file: Path, record: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "base.AT2"
+    told = called("motion", "deconvolve", record, "--scene", scene_file, "--out", out, "--linear")
+    assert (told.returncode, told.stderr) == (DONE, "")
+    wanted = Motion.from_file(record).deconvolved(scenes.column().profile(), linear=True)
+    np.testing.assert_allclose(Motion.from_at2(out).acceleration_g, wanted.acceleration_g, atol=1e-8)
+    assert "1 iterations, converged" in told.stdout
+    assert len(told.stdout.splitlines()) == 3 + len(scenes.column().profile().layers)
+    options = ("--scene", scene_file, "--out", out, "--max-frequency", 1e3)
+    assert "Nyquist" in refused("motion", "deconvolve", record, *options)
+
+
 def unitless(folder: Path) -> Path:
     path = folder / "unitless.csv"
     path.write_text("time,acceleration\n0.0,0.1\n0.01,0.2\n")

@@ -17,6 +17,7 @@ from .results import FILE_NAME, load
 from .run import Accuracy
 from .run import run as run_scene
 from .scene import Scene
+from .site import CurveChoice, Place, deconvolution
 
 EXIT_INVALID = 2
 EXIT_STOPPED = 3
@@ -46,6 +47,7 @@ ColumnOption = Annotated[str | None, typer.Option(help="Column of a CSV, by its 
 ThreadsOption = Annotated[int, typer.Option(help="Threads; the results do not depend on their number.")]
 AccuracyOption = Annotated[Accuracy, typer.Option(help="Fills the numerics that the scene leaves open.")]
 MotionFile = Annotated[Path, typer.Argument(help="Record: PEER .AT2, or CSV with a header.", metavar="FILE")]
+MotionOut = Annotated[Path, typer.Option(help="File to write, .AT2 or .csv.")]
 KindOption = Annotated[Kind, typer.Option(help="Where the motion is one of.")]
 
 
@@ -155,7 +157,7 @@ def spectrum(
 @motion_app.command()
 def convert(
     file: MotionFile,
-    out: Annotated[Path, typer.Option(help="File to write, .AT2 or .csv.")],
+    out: MotionOut,
     unit: UnitOption = None,
     column: ColumnOption = None,
     pga: Annotated[float | None, typer.Option(help="Scale to this peak acceleration, g.")] = None,
@@ -168,6 +170,33 @@ def convert(
         motion = motion.filtered(low=low, high=high)
     if pga is not None:
         motion = motion.scaled(pga_g=pga)
+    _write(motion, out)
+
+
+@motion_app.command()
+def deconvolve(
+    file: MotionFile,
+    scene: Annotated[Path, typer.Option(help="Scene whose ground the record stood on.")],
+    out: MotionOut,
+    unit: UnitOption = None,
+    column: ColumnOption = None,
+    kind: KindOption = "outcrop",
+    x: Annotated[float | None, typer.Option(help="Where it stood, m; default the middle.")] = None,
+    at: Annotated[Place, typer.Option(help="At which end of the ground it stood.")] = "surface",
+    curves: Annotated[CurveChoice, typer.Option(help="Stiffness and damping over strain.")] = "darendeli",
+    linear: Annotated[bool, typer.Option("--linear", help="Keep the stiffness of small strain.")] = False,
+    max_frequency: Annotated[float | None, typer.Option(help="Take faster waves away, Hz.")] = None,
+) -> None:
+    """Find the outcrop motion at the base of a scene from a record at its surface; print strains."""
+    motion = Motion.from_file(file, unit=unit, column=column, kind=kind)
+    ground = Scene.from_toml(scene).profile(x, curves=curves)
+    found = deconvolution(motion, ground, at=at, linear=linear, max_frequency=max_frequency)
+    _write(found.motion, out)
+    typer.echo(str(found))
+
+
+def _write(motion: Motion, out: Path) -> None:
+    """Write a motion in the form that the file's ending tells."""
     writers = {".at2": motion.write_at2, ".csv": motion.write_csv}
     if out.suffix.lower() not in writers:
         raise InvalidInput("--out", str(out), "must end in .AT2 or .csv: the ending chooses the form")
