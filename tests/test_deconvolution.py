@@ -121,7 +121,7 @@ def test_one_undamped_layer_shifts_the_record_both_ways(at: str, kind: str) -> N
 
 @pytest.mark.parametrize("damping", [0.0, 0.02, 0.05])
 def test_one_damped_layer_has_the_transfer_function_of_the_textbook(damping: float) -> None:
-    """|F| = 1/sqrt(cos^2 kH + sinh^2 (damping kH)) on rigid rock (Kramer 1996, eq. 7.13)."""
+    """|F| = 1/sqrt(cos^2 kH + sinh^2 (damping kH)) on rigid rock (Kramer 1996, section 7.2)."""
     thickness, Vs, dt = 20.0, 200.0, 0.005
     profile = SiteProfile([SiteLayer(thickness, 18.0, Vs, damping=damping)], half_space=HalfSpace(1e9, 1e6))
     surface = pulse(dt=dt)
