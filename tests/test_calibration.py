@@ -83,6 +83,13 @@ def test_overburden_lowers_resistance(row, factors):
     assert curve.published[0] > 1.0 > curve.published[1]
 
 
+def test_factors_are_of_the_earth_pressure_that_is_given():
+    soil = sand(TABLE_1[0])
+    curve = lab.k_sigma(soil, (200.0,), K0=1.0)
+    assert curve.crr[0] == lab.crr(soil, sigma_v0=200.0, K0=1.0)
+    assert curve.factor[0] == curve.crr[0] / lab.crr(soil, K0=1.0)
+
+
 def test_sustained_shear_changes_resistance_and_stands_beside_the_published():
     curve = lab.k_alpha(sand(TABLE_1[1]), (0.0, 0.2))
     assert curve.factor[0] == 1.0
@@ -196,3 +203,29 @@ def test_pictures_have_axes_and_the_target():
     assert "target" in [text.get_text() for text in axes.get_legend().get_texts()]
     assert axes.get_xlabel() == "uniform cycles"
     assert lab.k_sigma(sand(TABLE_1[0]), (50.0, 200.0)).plot().axes[0].get_xlabel().endswith("kPa")
+
+
+def test_a_curve_counts_the_first_stroke_as_a_half():
+    soil = sand(TABLE_1[1])
+    alone = lab.cyclic_dss(soil, csr=0.2).cycles_to(gamma_sa=0.03)
+    assert lab.crr_curve(soil, csr=[0.2]).cycles["3 % single amplitude"][0] == alone + 0.25
+
+
+def test_a_test_goes_on_until_a_large_double_amplitude():
+    soil = sand(TABLE_1[0])
+    # Were the test stopped before, no stress ratio short of the strength would do.
+    assert 1.0 < lab.crr(soil, gamma_da=0.15) / lab.crr(soil, gamma_da=0.05) < 1.3
+
+
+def test_correlations_keep_to_their_ends():
+    # The factors that are bounded: 0.3 and 1.1; and a resistance far from where its terms are small.
+    dense = correlations.k_sigma(4.0 * correlations.P_ATM, N160cs=45.0)
+    assert dense == pytest.approx(1.0 - 0.3 * math.log(4.0))
+    assert correlations.k_sigma(10.0, N160cs=45.0) == 1.1
+    by_cone = 1.0 - math.log(4.0) / (37.3 - 8.27 * 100.0**0.264)
+    assert correlations.k_sigma(4.0 * correlations.P_ATM, qc1Ncs=100.0) == pytest.approx(by_cone)
+    assert correlations.crr_from_cpt(175.0) == pytest.approx(0.6, rel=2e-3)
+    # Beyond a relative state index of -0.6 sand is as good as there.
+    assert correlations.k_alpha(0.2, Dr=0.9, sigma_v0=100.0) == correlations.k_alpha(
+        0.2, Dr=1.0, sigma_v0=100.0
+    )

@@ -380,3 +380,64 @@ def test_pictures_show_the_test_and_what_it_is_compared_with(cyclic: lab.CyclicT
 def test_a_reference_without_a_column_is_refused(cyclic: lab.CyclicTest) -> None:
     with pytest.raises(InvalidInput, match="must have sigma_v_eff, an array"):
         cyclic.plot(reference={"gamma": [0.0]})
+
+
+def test_the_arrays_of_a_compression_are_what_their_names_say():
+    test = lab.plane_strain_compression(SAND, sigma_v0=100.0, K0=0.6, axial_strain_max=0.02)
+    assert test.excess_pore_pressure[0] == 0.0
+    assert test.p[0] == pytest.approx(80.0)
+    assert test.q[0] == pytest.approx(40.0)
+    assert test.p == pytest.approx(0.5 * (test.sigma_v_eff + test.sigma_h_eff))
+    assert test.excess_pore_pressure == pytest.approx(60.0 - test.sigma_h_eff)
+
+
+def test_peaks_keep_the_pore_pressure_ratio_of_the_test():
+    test = lab.cyclic_dss(SAND, csr=0.2, max_cycles=2)
+    at_turn = np.flatnonzero(np.diff(test.turns, prepend=0))
+    assert (test.peaks().r_u == test.r_u[at_turn]).all()
+
+
+def test_the_stress_out_of_the_plane_begins_at_that_of_the_side():
+    test = lab.monotonic_dss(sb.Elastic(G=3e4, K=9e4), sigma_v0=100.0, K0=0.4, gamma_max=1e-3)
+    assert test.specimen.stress[3] == pytest.approx(-40.0)
+
+
+def test_the_strength_that_bounds_a_turn_is_that_of_the_void_ratio():
+    """Bolton's critical state at Dr 1/3, whatever Dr the parameters are of."""
+    pressure = 0.01 * 101.3 * math.exp(10.0 - 1.5 * 3.0)
+    bound = math.sin(math.radians(33.0)) * pressure / 101.3
+    with pytest.raises(sb.InvalidInput, match=f"must turn within {bound:.3f}"):
+        lab.cyclic_dss(SAND, csr=5.0, void_ratio=0.7)
+
+
+def test_the_bounding_ratio_that_bounds_a_drained_turn_is_that_of_the_void_ratio():
+    same = sb.PM4Sand(Dr=0.8, G0=677.0, hpo=0.4)
+    told = []
+    for soil, void_ratio in ((same, None), (SAND, same.initial_void_ratio), (SAND, None)):
+        with pytest.raises(sb.InvalidInput, match="must turn within") as refused:
+            lab.cyclic_dss(soil, csr=9.0, drained=True, void_ratio=void_ratio)
+        told.append(refused.value.allowed)
+    assert told[0] == told[1] != told[2]
+
+
+def test_damping_of_perfect_plasticity_is_that_of_the_parallelogram():
+    soil = sb.TotalStress(Su=30.0, G=1e4, K=1e5)
+    test = lab.modulus_reduction(soil, K0=1.0, strains=[1e-3, 6e-3, 3e-2], drained=False)
+    yielding = np.minimum(1.0, 3e-3 / test.gamma)
+    assert test.G_ratio == pytest.approx(yielding, rel=1e-9)
+    assert test.damping == pytest.approx(2.0 / np.pi * (1.0 - yielding), abs=1e-9)
+
+
+@pytest.mark.parametrize("cycles", [1, 3])
+def test_modulus_is_that_of_the_last_loop(cycles):
+    strain = 1e-3
+    found = lab.modulus_reduction(SAND, strains=[strain], cycles=cycles)
+    turns = [strain, -strain] * cycles + [strain]
+    rows = lab.cyclic_dss(SAND, drained=True, gamma_reversals=turns).peaks()
+    assert found.G[0] == pytest.approx((rows.tau[-1] - rows.tau[-2]) / (2.0 * strain), rel=1e-4)
+
+
+def test_contraction_after_a_drained_test_counts_from_its_end():
+    test = lab.cyclic_dss(SAND, drained=True, gamma_reversals=[5e-3, -5e-3])
+    assert test.eps_v[-1] > 1e-4
+    assert lab.reconsolidation(test).eps_v[0] == 0.0

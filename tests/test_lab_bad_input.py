@@ -57,6 +57,7 @@ CYCLIC: list[tuple[str, dict[str, Any], str]] = [
     ("tolerance", {"csr": 0.1, "tolerance": 1e-5, "integrator": "rk4"}, "has no effect"),
     ("reversals", {"reversals": []}, "n at least 1"),
     ("reversals", {"reversals": [[0.1, -0.1]]}, r"must have shape \(n,\)"),
+    ("void_ratio", {"csr": 0.1, "void_ratio": 0.45}, r"must lie in \[0.5, 0.8\)"),
     ("reversals", {"reversals": [0.1, math.inf]}, "must be finite throughout"),
     ("reversals", {"reversals": ["up", "down"]}, "must be numbers"),
     ("reversals", {"reversals": [0.1, -30.0]}, "must turn within"),

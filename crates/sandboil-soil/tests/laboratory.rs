@@ -324,3 +324,15 @@ fn resolution_keeps_what_moved_enough_in_stress_or_in_strain() {
     assert_eq!(run(Resolution { stress: 3.9, strain: f64::INFINITY }), 11);
     assert_eq!(run(Resolution { stress: 3.9, strain: 0.45e-4 }), 21);
 }
+
+#[test]
+fn the_allowed_strain_counts_from_the_start_of_each_shear() {
+    let mut specimen = specimen(&Elastic::new(4.0e4, 8.7e4).unwrap());
+    for end in [0.04, 0.08, 0.0] {
+        let turns = Turns::Each(vec![Turn::Strain(end)]);
+        let test = Shear { drained: false, turns, strain_step: STEP, strain_limit: 0.05 };
+        let ending = specimen.shear(&test, &mut Record::new(Resolution::TURNS), &mut never);
+        // From 8 % back to nothing is more than 5 %.
+        assert_eq!(ending, if end == 0.0 { Ending::StrainLimit } else { Ending::Complete });
+    }
+}
