@@ -142,7 +142,7 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("sigma_v0", {"sigma_v0": -100.0}, r"must lie in \(0, 100000\] .*compression positive"),
     ("K0", {"K0": 0.1}, r"must lie in \[0\.\d+, [34]\.\d+\]"),
     ("gamma_stop", {"gamma_stop": 5.0}, r"must lie in \(0, 0.2\] .*5 % is written 0.05"),
-    ("max_cycles", {"max_cycles": 0.5}, "integer"),
+    ("max_cycles", {"max_cycles": 0.5}, "whole number"),
     ("density", {"density": 0.0}, "must be greater than 0 .*2000 kg/m3 is written 2.0"),
     ("void_ratio", {"void_ratio": 0.9}, r"must lie in \[0\.5, 0\.8\)"),
     ("strain_step", {"strain_step": 0.1}, r"must lie in \(0, 0.001\]"),

@@ -11,7 +11,7 @@ use crate::{
     geometry::{Geometry, Wall, stress_node_positions},
     model::{Model, Numerics, Region, STRESS_NODES, positive},
     parallel::{Rows, chunks, for_each_chunk},
-    simulation::{Counters, RUNAWAY_SPEED},
+    simulation::{CHECK_INTERVAL, Counters, RUNAWAY_SPEED, SHAKING_FACTOR, step_is_outgrown},
     skeleton::{NodalShare, StressPoint, conservative_force, local_damping, motion},
     soil_field::SoilField,
     timestep::{PressureCoupling, PressureSpectrum, region_limit},
@@ -22,8 +22,6 @@ use sandboil_soil::{
 };
 use sandboil_sph::{Vec2, WendlandQuintic};
 
-/// Time step over the stability limit, which is found anew after every step: soil has no time to stiffen unseen.
-const TIME_STEP_FACTOR: f64 = 0.9;
 /// Stress that a reversal may pass its target by, over the target.
 const OVERSHOOT: f64 = 1e-3;
 /// Shear strain over which the tangent stiffness is averaged.
@@ -376,7 +374,7 @@ impl ShearCell {
     /// Time step at the safe share of the limit of the present stiffness, s.
     fn limit(&self) -> f64 {
         let stiffest = self.points.iter().map(|point| point.stiffness).fold(0.0, f64::max);
-        TIME_STEP_FACTOR
+        SHAKING_FACTOR
             * region_limit(&self.model, 0, stiffest, PressureCoupling::None, &self.spectrum, None).0
     }
 
@@ -462,8 +460,10 @@ impl ShearCell {
         } else {
             self.record.offer(self.now);
         }
-        self.dt = self.limit();
-        self.check()
+        if self.counters.steps.is_multiple_of(CHECK_INTERVAL) {
+            self.check()?;
+        }
+        Ok(())
     }
 
     /// Velocities of the free nodes, moved by the force of the stress around them (Eq. 6).
@@ -532,14 +532,19 @@ impl ShearCell {
         }
     }
 
-    /// Refuses velocities that are no longer bounded.
-    fn check(&self) -> Result<(), SolverError> {
+    /// Finiteness and stability limit, every few steps.
+    fn check(&mut self) -> Result<(), SolverError> {
         for (j, v) in self.velocity[..self.free].iter().enumerate() {
             let speed = v.norm();
             // NaN must take the error branch.
             if !(speed <= RUNAWAY_SPEED) {
                 return Err(self.diverged("velocity", j, speed));
             }
+        }
+        let target = self.limit();
+        if step_is_outgrown(self.dt, target) {
+            self.dt = target;
+            self.counters.time_step_changes += 1;
         }
         Ok(())
     }

@@ -22,7 +22,7 @@ use sandboil_soil::{Stress, UpdateReport};
 use sandboil_sph::Vec2;
 
 /// Steps between checks of stability limit, geometry and finiteness.
-const CHECK_INTERVAL: u64 = 16;
+pub(crate) const CHECK_INTERVAL: u64 = 16;
 /// Time-step factor of the gravity stage: kinetic damping needs no margin for stiffening.
 const RELAXATION_FACTOR: f64 = 0.85;
 /// Default factor in shaking: soil stiffens in cycles between checks.
@@ -753,7 +753,7 @@ impl Simulation {
             return Err(self.diverged("pore pressure", j, value));
         }
         let (target, criterion) = self.limit(shaking.coupling, shaking.stage.time_step_factor);
-        if self.dt > SHRINK_AT * target || self.dt * GROW_AT < target {
+        if step_is_outgrown(self.dt, target) {
             (self.dt, self.criterion) = (target, criterion);
             self.counters.time_step_changes += 1;
         }
@@ -1023,6 +1023,11 @@ impl Simulation {
             _ => (Vec::new(), Vec::new()),
         }
     }
+}
+
+/// Whether a time step is too far from its target to be kept.
+pub(crate) fn step_is_outgrown(dt: f64, target: f64) -> bool {
+    dt > SHRINK_AT * target || dt * GROW_AT < target
 }
 
 /// History channels of one probe. Stress is effective, tension positive.
