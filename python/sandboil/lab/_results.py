@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Self
 
@@ -16,12 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Table:
+class Table(ABC):
     """Columns of equal length."""
 
+    @abstractmethod
     def columns(self) -> dict[str, NDArray[Any]]:
         """Every column by its name."""
-        raise NotImplementedError
 
     def to_dataframe(self) -> Any:
         """One row per record, one column per array, as a pandas DataFrame.
