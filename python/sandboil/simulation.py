@@ -247,12 +247,17 @@ class Simulation:
             self._core.begin_gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
             return
         scene, output = self.scene, self.scene.output
-        base, rayleigh = stage.base, stage.rayleigh
+        base, rayleigh, wave = stage.base, stage.rayleigh, self._waves[self._index]
         self._core.begin_shaking(
             {
                 "duration": self.duration,
-                "wave": self._waves[self._index],
-                "half_space": None if base.Vs is None else (base.Vs, base.density),
+                "waves": [] if wave is None else [(*wave, None)],
+                "base": {
+                    "vertical": "roller",
+                    "half_space": None if base.Vs is None else (base.Vs, None, base.density),
+                    "segments": [(-math.inf, math.inf, None if wave is None else 0, 0.0, 0.0)],
+                },
+                "sides": ("wall", "wall"),
                 "local_damping": scene.numerics.local_damping,
                 "rayleigh": None if rayleigh is None else (rayleigh.ratio, rayleigh.frequencies),
                 "time_step_factor": scene.numerics.time_step_factor,
@@ -424,7 +429,10 @@ def _description(scene: Scene, particles: Discretisation) -> dict[str, Any]:
         "water": None if water is None else (water.unit_weight, water.bulk_modulus),
         "gravity": scene.gravity,
         "period": x1 - x0,
-        "base_elevation": y0,
+        "base": np.array([(x0, y0), (x1, y0)]),
+        "base_support": "no-slip",
+        "left": None,
+        "right": None,
         "numerics": numerics,
     }
 

@@ -79,6 +79,73 @@ fn region(dict: &Bound<'_, PyDict>, gap_memory: bool) -> PyResult<solver::Region
     })
 }
 
+const SUPPORTS: [(&str, solver::Support); 4] = [
+    ("no-slip", solver::Support::NoSlip),
+    ("fixed", solver::Support::NoSlip),
+    ("free-slip", solver::Support::FreeSlip),
+    ("roller", solver::Support::FreeSlip),
+];
+
+fn side(dict: &Bound<'_, PyDict>) -> PyResult<solver::Side> {
+    Ok(solver::Side {
+        x: get(dict, "x")?,
+        extent: [get(dict, "bottom")?, get(dict, "top")?],
+        support: one_of("support", &get::<String>(dict, "support")?, &SUPPORTS)?,
+    })
+}
+
+fn outline(dict: &Bound<'_, PyDict>) -> PyResult<solver::Outline> {
+    let sides = ["left", "right"]
+        .map(|key| get::<Option<Bound<'_, PyDict>>>(dict, key)?.as_ref().map(side).transpose());
+    let [left, right] = sides;
+    Ok(solver::Outline {
+        base: vectors(&get(dict, "base")?),
+        base_support: one_of("base_support", &get::<String>(dict, "base_support")?, &SUPPORTS)?,
+        sides: [left?, right?],
+    })
+}
+
+/// Interval, horizontal and vertical velocities of an upgoing wave.
+type WaveArrays<'py> = (f64, PyReadonlyArray1<'py, f64>, Option<PyReadonlyArray1<'py, f64>>);
+
+fn base(stage: &Bound<'_, PyDict>) -> PyResult<solver::Base> {
+    let dict: Bound<'_, PyDict> = get(stage, "base")?;
+    let waves = get::<Vec<WaveArrays<'_>>>(stage, "waves")?
+        .into_iter()
+        .map(|(interval, horizontal, vertical)| -> PyResult<_> {
+            let vertical = vertical.map(|samples| samples.as_slice().map(<[f64]>::to_vec)).transpose()?;
+            Ok(solver::UpgoingWave {
+                interval,
+                horizontal: horizontal.as_slice()?.to_vec(),
+                vertical: vertical.unwrap_or_default(),
+            })
+        })
+        .collect::<PyResult<Vec<_>>>()?;
+    let half_space: Option<(f64, Option<f64>, f64)> = get(&dict, "half_space")?;
+    let segments: Vec<(f64, f64, Option<usize>, f64, f64)> = get(&dict, "segments")?;
+    let segment = |(from, to, wave, delay, slowness): (f64, f64, Option<usize>, f64, f64)| match wave {
+        Some(wave) if wave >= waves.len() => {
+            Err(PyValueError::new_err(format!("segments: there is no wave {wave}")))
+        }
+        _ => Ok(solver::BaseSegment { extent: [from, to], wave, delay, slowness }),
+    };
+    Ok(solver::Base {
+        vertical: one_of(
+            "vertical",
+            &get::<String>(&dict, "vertical")?,
+            &[("roller", solver::Vertical::Roller), ("absorbing", solver::Vertical::Absorbing)],
+        )?,
+        half_space: half_space.map(|(shear_speed, compression_speed, density)| solver::HalfSpace {
+            shear_speed,
+            compression_speed,
+            density,
+        }),
+        segments: segments.into_iter().map(segment).collect::<PyResult<_>>()?,
+        datum: None,
+        waves,
+    })
+}
+
 fn model(dict: &Bound<'_, PyDict>) -> PyResult<solver::Model> {
     let numerics_dict: Bound<'_, PyDict> = get(dict, "numerics")?;
     let gap_memory = get(&numerics_dict, "gap_memory")?;
@@ -98,7 +165,7 @@ fn model(dict: &Bound<'_, PyDict>) -> PyResult<solver::Model> {
         water: water.map(|(unit_weight, bulk_modulus)| solver::Water { unit_weight, bulk_modulus }),
         gravity: get(dict, "gravity")?,
         period: get::<Option<f64>>(dict, "period")?.map(|width| solver::Period { width }),
-        base_elevation: get(dict, "base_elevation")?,
+        outline: outline(dict)?,
         numerics: numerics(&numerics_dict)?,
     })
 }
@@ -132,17 +199,13 @@ impl Simulation {
     }
 
     fn begin_shaking(&mut self, stage: &Bound<'_, PyDict>) -> PyResult<()> {
-        let wave: Option<(f64, PyReadonlyArray1<'_, f64>)> = get(stage, "wave")?;
-        let wave = wave
-            .map(|(interval, velocity)| -> PyResult<_> {
-                Ok(solver::UpgoingWave { interval, velocity: velocity.as_slice()?.to_vec() })
-            })
-            .transpose()?;
+        let [left, right] = get::<[String; 2]>(stage, "sides")?;
+        let is_free = |side: &str| one_of("sides", side, &[("free-field", true), ("wall", false)]);
         let rayleigh: Option<(f64, [f64; 2])> = get(stage, "rayleigh")?;
         let stage = solver::Shaking {
             duration: get(stage, "duration")?,
-            wave,
-            half_space: get(stage, "half_space")?,
+            base: base(stage)?,
+            free_field: [is_free(&left)?, is_free(&right)?],
             local_damping: get(stage, "local_damping")?,
             rayleigh: rayleigh.map(|(ratio, frequencies)| solver::Rayleigh { ratio, frequencies }),
             time_step_factor: get::<Option<f64>>(stage, "time_step_factor")?
@@ -298,6 +361,7 @@ pub fn counted<'py>(py: Python<'py>, counters: &solver::Counters) -> PyResult<Bo
         ("steps", counters.steps),
         ("flow_calls", counters.flow_calls),
         ("base_calls", counters.base_calls),
+        ("free_field_calls", counters.free_field_calls),
         ("plastic_updates", counters.plastic_updates),
         ("geometry_builds", counters.geometry_builds),
         ("porosity_clips", counters.porosity_clips),

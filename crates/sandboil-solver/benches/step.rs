@@ -53,7 +53,7 @@ fn under_way(ground: Ground, columns: usize, threads: usize) -> Simulation {
     simulation.begin_gravity(Gravity { tolerance: 1e-4, max_steps: 20_000 }).unwrap();
     simulation.advance(RELAXATION, f64::INFINITY).unwrap();
     let velocity = (0..20_000).map(|k| 0.1 * (4e-3 * std::f64::consts::PI * f64::from(k)).sin()).collect();
-    let stage = shaking(Some(UpgoingWave { interval: 1e-3, velocity }), 1e3, Vec::new());
+    let stage = shaking(Some(UpgoingWave::shear(1e-3, velocity)), 1e3, Vec::new());
     simulation.begin_shaking(stage).unwrap();
     simulation.advance(LEAD, f64::INFINITY).unwrap();
     simulation

@@ -1,36 +1,53 @@
-//! Compliant base (Eq. 14 as corrected): an incoming shear wave and a dashpot, through the trace of the
-//! velocity field on the base.
+//! Boundaries that let waves out and in: dashpots on the trace of the velocity field, at the compliant base (Eq. 14 as
+//! corrected) and on free-field sides (Eq. 15 as corrected).
 
 use crate::{
+    boundary::EdgeNodes,
     geometry::point_weights,
     model::{Model, Operators},
 };
 use sandboil_sph::{Csr, Vec2};
 
-/// Velocity history of the upgoing wave at the base: half of an outcrop motion, m/s.
-#[derive(Debug, Clone, PartialEq)]
+/// Velocity history of the upgoing waves at the base: half of an outcrop motion, m/s.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct UpgoingWave {
     /// Sampling interval, s.
     pub interval: f64,
-    /// Horizontal velocity, m/s, first sample at time zero; at rest after the last.
-    pub velocity: Vec<f64>,
+    /// Horizontal velocity (shear wave), m/s, first sample at time zero; at rest after the last.
+    pub horizontal: Vec<f64>,
+    /// Vertical velocity (compression wave), m/s; empty: none.
+    pub vertical: Vec<f64>,
 }
 
 impl UpgoingWave {
-    /// Velocity at a time by linear interpolation, zero outside the record.
-    pub fn at(&self, time: f64) -> f64 {
-        let place = time / self.interval;
-        if !(place >= 0.0) {
-            return 0.0;
-        }
-        let before = place.floor();
-        let fraction = place - before;
-        let sample = |index: f64| {
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // whole and not negative
-            self.velocity.get(index as usize).copied().unwrap_or(0.0)
-        };
-        sample(before) * (1.0 - fraction) + sample(before + 1.0) * fraction
+    /// A shear wave alone, of horizontal velocities in m/s.
+    pub fn shear(interval: f64, horizontal: Vec<f64>) -> Self {
+        Self { interval, horizontal, vertical: Vec::new() }
     }
+
+    /// Horizontal velocity at a time, m/s.
+    pub fn horizontal_at(&self, time: f64) -> f64 {
+        interpolated(&self.horizontal, time / self.interval)
+    }
+
+    /// Vertical velocity at a time, m/s.
+    pub fn vertical_at(&self, time: f64) -> f64 {
+        interpolated(&self.vertical, time / self.interval)
+    }
+}
+
+/// Linear interpolation between samples, zero outside the record; `place` counts samples.
+fn interpolated(samples: &[f64], place: f64) -> f64 {
+    if !(place >= 0.0) {
+        return 0.0;
+    }
+    let before = place.floor();
+    let fraction = place - before;
+    let sample = |index: f64| {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // whole and not negative
+        samples.get(index as usize).copied().unwrap_or(0.0)
+    };
+    sample(before) * (1.0 - fraction) + sample(before + 1.0) * fraction
 }
 
 /// Means over a step of `exp(-z t)` and of what a constant push moves meanwhile, `(1 - exp(-z t)) / z`, with `t` in
@@ -45,114 +62,321 @@ fn relaxation(z: f64) -> (f64, f64) {
     (relaxed, (1.0 - relaxed) / z)
 }
 
-/// One boundary point below each node of the lowest row.
-#[derive(Debug, Clone)]
-pub struct CompliantBase {
-    /// Linear-fit weights of the velocity on the base: rows are base points, columns velocity nodes.
-    trace: Csr<f64>,
-    /// Dashpot coefficient `eta = rho_m C_s`, kPa s/m.
-    impedance: Vec<f64>,
-    /// `sum_j N_ij sum_k N_kj A_k eta_k / m_j`: what a unit of the trace velocity loses in a second, 1/s.
-    rate: Vec<f64>,
-    /// Length of base each point stands for, m.
-    length: f64,
-    wave: Option<UpgoingWave>,
-    trace_before: Vec<f64>,
+/// A dashpot at a point of an edge, in one direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dashpot {
+    /// Index of its point.
+    pub point: usize,
+    /// Unit vector of the velocity it feels.
+    pub direction: Vec2,
+    /// `rho_m C`, kPa s/m.
+    pub impedance: f64,
+    /// Length of edge it stands for, m.
+    pub length: f64,
 }
 
-impl CompliantBase {
-    /// Base points of the lowest row of `model`, with the impedance (kPa s/m) of each.
-    pub fn new(
-        model: &Model,
-        position: &[Vec2],
-        mass: &[f64],
-        impedance: Vec<f64>,
-        wave: Option<UpgoingWave>,
-    ) -> Self {
-        let points = base_points(model, position);
-        let trace = match model.numerics.operators {
-            Operators::Conservative => point_weights(model, position, &points),
-            Operators::Printed => lowest_row(model, position),
+/// Dashpots along an edge.
+#[derive(Debug, Clone, Default)]
+pub struct Dashpots {
+    all: Vec<Dashpot>,
+    /// Weights of the velocity on the edge: rows are points, columns velocity nodes.
+    trace: Csr<f64>,
+    /// `sum_j N_ij sum_k N_kj A_k eta_k / m_j`: what a unit of the trace velocity loses in a second, 1/s.
+    rate: Vec<f64>,
+    before: Vec<f64>,
+    traction: Vec<f64>,
+}
+
+impl Dashpots {
+    /// Dashpots on points whose velocity `trace` reads.
+    pub fn new(all: Vec<Dashpot>, trace: Csr<f64>, mass: &[f64]) -> Self {
+        // A unit velocity in the dashpot's direction is resisted by every dashpot, each as far as it looks that way.
+        let transposed = trace.transposed(mass.len());
+        let mut at_point: Vec<Vec<&Dashpot>> = vec![Vec::new(); trace.rows()];
+        for dashpot in &all {
+            at_point[dashpot.point].push(dashpot);
+        }
+        let drag = |node: usize, direction: Vec2| -> f64 {
+            let at = |(point, weight): (usize, &f64)| -> f64 {
+                let felt = |d: &&Dashpot| d.length * d.impedance * d.direction.dot(&direction).powi(2);
+                weight * at_point[point].iter().map(felt).sum::<f64>()
+            };
+            transposed.iter_row(node).map(at).sum()
         };
-        let length = model.spacing.x;
-        let transposed = trace.transposed(position.len());
-        let drag = |node: usize| -> f64 {
-            transposed.iter_row(node).map(|(point, weight)| weight * length * impedance[point]).sum()
-        };
-        let rate: Vec<f64> = (0..points.len())
-            .map(|point| trace.iter_row(point).map(|(node, weight)| weight * drag(node) / mass[node]).sum())
+        let rate = all
+            .iter()
+            .map(|dashpot| {
+                let lost =
+                    |(node, weight): (usize, &f64)| weight * drag(node, dashpot.direction) / mass[node];
+                trace.iter_row(dashpot.point).map(lost).sum()
+            })
             .collect();
-        Self { trace_before: vec![0.0; points.len()], trace, impedance, rate, length, wave }
+        Self { before: vec![0.0; all.len()], traction: vec![0.0; all.len()], rate, trace, all }
     }
 
-    /// Dashpot coefficients, kPa s/m.
-    pub fn impedance(&self) -> &[f64] {
-        &self.impedance
+    /// The dashpots.
+    pub fn all(&self) -> &[Dashpot] {
+        &self.all
+    }
+
+    /// Mean traction of the last step of each dashpot in its direction, kPa.
+    pub fn traction(&self) -> &[f64] {
+        &self.traction
+    }
+
+    fn felt(&self, dashpot: &Dashpot, velocity: &[Vec2]) -> f64 {
+        let along = |(node, weight): (usize, &f64)| weight * velocity[node].dot(&dashpot.direction);
+        self.trace.iter_row(dashpot.point).map(along).sum()
     }
 
     /// Remembers the trace before the step's forces act.
     pub fn begin_step(&mut self, velocity: &[Vec2]) {
-        for (point, before) in self.trace_before.iter_mut().enumerate() {
-            *before = self.trace.iter_row(point).map(|(node, weight)| weight * velocity[node].x).sum();
+        for k in 0..self.all.len() {
+            self.before[k] = self.felt(&self.all[k], velocity);
         }
     }
 
-    /// Adds the base traction of Eq. 14 to velocities that all other forces of the step have moved already.
+    /// Adds the tractions to velocities that all other forces of the step have moved already. `target` is the velocity
+    /// (m/s) in its direction towards which each dashpot pulls.
     ///
-    /// The trace relaxes towards twice the upgoing velocity; over a step of constant other forces this is solved
-    /// exactly, so a dashpot of any strength neither limits the time step nor overshoots. The coupling between
-    /// neighbouring points is lumped, exact for uniform motion.
+    /// Over a step of constant other forces the pull is solved exactly, so a dashpot of any strength neither limits the
+    /// time step nor overshoots. The coupling between neighbouring points is lumped, exact for uniform motion.
     pub fn end_step(
         &mut self,
-        time: f64,
         dt: f64,
         mass: &[f64],
-        velocity: &mut [Vec2],
-        acceleration: &mut [Vec2],
+        (velocity, acceleration): (&mut [Vec2], &mut [Vec2]),
+        target: impl Fn(usize) -> f64,
     ) {
-        let incoming = 2.0 * self.wave.as_ref().map_or(0.0, |wave| wave.at(time));
-        for point in 0..self.impedance.len() {
-            let moved: f64 = self.trace.iter_row(point).map(|(node, weight)| weight * velocity[node].x).sum();
-            let before = self.trace_before[point];
-            let (relaxed, pushed) = relaxation(self.rate[point] * dt);
-            // The traction is kept in the slot of the old trace until all points have read the velocities.
-            self.trace_before[point] =
-                self.impedance[point] * (relaxed * (incoming - before) - pushed * (moved - before));
+        // All points read the velocities before any is changed.
+        for (k, dashpot) in self.all.iter().enumerate() {
+            let (before, moved) = (self.before[k], self.felt(dashpot, velocity));
+            let (relaxed, pushed) = relaxation(self.rate[k] * dt);
+            self.traction[k] =
+                dashpot.impedance * (relaxed * (target(k) - before) - pushed * (moved - before));
         }
-        for point in 0..self.impedance.len() {
-            let force = self.trace_before[point] * self.length;
-            for (node, weight) in self.trace.iter_row(point) {
-                let pushed = weight * force / mass[node];
-                velocity[node].x += dt * pushed;
-                acceleration[node].x += pushed;
+        for (dashpot, traction) in self.all.iter().zip(&self.traction) {
+            let force = dashpot.direction * (traction * dashpot.length);
+            for (node, weight) in self.trace.iter_row(dashpot.point) {
+                let pushed = force * (weight / mass[node]);
+                velocity[node] += pushed * dt;
+                acceleration[node] += pushed;
             }
         }
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.trace.bytes() + 3 * size_of_val(self.impedance.as_slice())
+        self.trace.bytes() + size_of_val(self.all.as_slice()) + 3 * size_of_val(self.rate.as_slice())
     }
 }
 
-/// The printed trace: the outermost layer of nodes itself (Section 4.2).
-fn lowest_row(model: &Model, position: &[Vec2]) -> Csr<f64> {
-    let mut table = Csr::with_capacity(0, 0);
-    for node in lowest_nodes(model, position) {
-        table.push_row(&mut [(u32::try_from(node).unwrap_or(u32::MAX), 1.0)]);
+/// Trace of the velocity field at points of an edge. The printed set reads the outermost node itself (Section 4.2).
+pub fn trace(model: &Model, position: &[Vec2], points: &[Vec2], nodes: &[usize]) -> Csr<f64> {
+    match model.numerics.operators {
+        Operators::Conservative => point_weights(model, position, points),
+        Operators::Printed => {
+            let mut table = Csr::with_capacity(nodes.len(), nodes.len());
+            for &node in nodes {
+                table.push_row(&mut [(crate::boundary::id(node), 1.0)]);
+            }
+            table
+        }
     }
-    table
 }
 
-/// Nodes of the lowest row.
-pub fn lowest_nodes(model: &Model, position: &[Vec2]) -> impl Iterator<Item = usize> {
-    let top = model.base_elevation + model.spacing.y;
-    position.iter().enumerate().filter(move |(_, x)| x.y < top).map(|(node, _)| node)
+/// What the base does vertically while it is shaken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Vertical {
+    /// Held, as the elements of a column are: compression waves come back.
+    Roller,
+    /// Held by the stored reaction alone: compression waves leave, and may come in.
+    Absorbing,
 }
 
-/// Points on the base below the nodes of the lowest row, m.
-pub fn base_points(model: &Model, position: &[Vec2]) -> Vec<Vec2> {
-    lowest_nodes(model, position).map(|node| Vec2::new(position[node].x, model.base_elevation)).collect()
+/// A half-space given by its own properties.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HalfSpace {
+    /// Shear-wave speed, m/s.
+    pub shear_speed: f64,
+    /// Compression-wave speed, m/s; needed where the base absorbs vertically or slopes.
+    pub compression_speed: Option<f64>,
+    /// Density, Mg/m3.
+    pub density: f64,
+}
+
+/// Impedances `rho C_s` and `rho C_p` (kPa s/m) and the speeds (m/s) of the half-space below a point of the base.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impedance {
+    /// Density, Mg/m3.
+    pub density: f64,
+    /// Shear-wave speed, m/s.
+    pub shear_speed: f64,
+    /// Compression-wave speed, undrained where there is water, m/s.
+    pub compression_speed: f64,
+}
+
+/// Which wave comes to a stretch of the base, and when.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BaseSegment {
+    /// Its ends, m; what lies beyond the outermost ones belongs to them.
+    pub extent: [f64; 2],
+    /// Index of its wave; none: no motion.
+    pub wave: Option<usize>,
+    /// When the wave's first sample reaches its left end, s.
+    pub delay: f64,
+    /// How much later each metre further right is reached, s/m.
+    pub slowness: f64,
+}
+
+impl BaseSegment {
+    /// One wave for all of the base at once.
+    pub fn everywhere(wave: Option<usize>) -> Self {
+        Self { extent: [f64::NEG_INFINITY, f64::INFINITY], wave, delay: 0.0, slowness: 0.0 }
+    }
+}
+
+/// The base of a shaking stage.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Base {
+    /// What it does vertically.
+    pub vertical: Vertical,
+    /// The half-space, instead of the soil above the base.
+    pub half_space: Option<HalfSpace>,
+    /// The waves that its segments name.
+    pub waves: Vec<UpgoingWave>,
+    /// Its segments from left to right.
+    pub segments: Vec<BaseSegment>,
+    /// Elevation at which the waves' times hold, m; none: the lowest point of the base.
+    pub datum: Option<f64>,
+}
+
+impl Base {
+    /// A compliant roller base under one wave, or none.
+    pub fn shaken_by(wave: Option<UpgoingWave>) -> Self {
+        let segment = BaseSegment::everywhere(wave.as_ref().map(|_| 0));
+        Self {
+            vertical: Vertical::Roller,
+            half_space: None,
+            waves: wave.into_iter().collect(),
+            segments: vec![segment],
+            datum: None,
+        }
+    }
+
+    /// What comes to the place `x`, as a segment for all of a base.
+    pub fn at(&self, x: f64) -> BaseSegment {
+        let segment = self.segments.iter().find(|s| x <= s.extent[1]).or(self.segments.last());
+        segment.map_or(BaseSegment::everywhere(None), |segment| {
+            let run = if segment.slowness == 0.0 { 0.0 } else { segment.slowness * (x - segment.extent[0]) };
+            BaseSegment { delay: segment.delay + run, ..BaseSegment::everywhere(segment.wave) }
+        })
+    }
+}
+
+/// What comes in at one dashpot of the base: velocities of the half-space's waves, weighted.
+#[derive(Debug, Clone, Copy)]
+struct Incoming {
+    wave: usize,
+    /// Delay of the shear and of the compression wave, s.
+    delay: [f64; 2],
+    /// Pull for a unit of the upgoing horizontal and vertical velocity.
+    factor: Vec2,
+}
+
+/// The compliant base: dashpots that pull towards the motion of the half-space.
+///
+/// On a half-space with the upgoing waves `v_su`, `v_pu` a dashpot's traction is `sigma_up . n + eta (v_up - v)`, with
+/// the stress `sigma_up` of the waves. On a level base this is Eq. 14, `2 rho C_s v_su - eta_s v_x` and the same for P;
+/// the waves rise with level fronts, so on an inclined base their stress turns with the normal and they are late by the
+/// height over the datum.
+#[derive(Debug, Clone)]
+pub struct CompliantBase {
+    dashpots: Dashpots,
+    incoming: Vec<Option<Incoming>>,
+    waves: Vec<UpgoingWave>,
+    impedance: Vec<Impedance>,
+}
+
+impl CompliantBase {
+    /// A dashpot below each of the lowest nodes, on half-spaces of the given impedances.
+    pub fn new(
+        model: &Model,
+        (edges, position): (&EdgeNodes, &[Vec2]),
+        mass: &[f64],
+        impedance: Vec<Impedance>,
+        base: &Base,
+    ) -> Self {
+        let points = edges.base_points(model, position);
+        let datum = base.datum.unwrap_or_else(|| model.outline.lowest());
+        let (mut all, mut incoming) = (Vec::new(), Vec::new());
+        for ((point, at), below) in points.iter().enumerate().zip(&impedance) {
+            let Impedance { density, shear_speed, compression_speed } = *below;
+            let (eta_s, eta_p) = (density * shear_speed, density * compression_speed);
+            let normal = model.outline.base_normal(at.x);
+            let tangent = Vec2::new(-normal.y, normal.x);
+            // What resists a horizontal motion of an inclined roller base: its components along and across.
+            let horizontal = (Vec2::x(), eta_s * tangent.x.powi(2) + eta_p * normal.x.powi(2));
+            let directions = match base.vertical {
+                Vertical::Roller => vec![horizontal],
+                Vertical::Absorbing => vec![(tangent, eta_s), (normal, eta_p)],
+            };
+            // Stress of upgoing waves of unit velocity on the base.
+            let lateral = eta_p - 2.0 * eta_s * shear_speed / compression_speed;
+            let shear_wave = -eta_s * Vec2::new(normal.y, normal.x);
+            let compression_wave = -Vec2::new(lateral * normal.x, eta_p * normal.y);
+            for (direction, impedance) in directions {
+                all.push(Dashpot { point, direction, impedance, length: model.spacing.x / -normal.y });
+                let (rise, arrival) = (at.y - datum, base.at(at.x));
+                incoming.push(arrival.wave.map(|wave| Incoming {
+                    wave,
+                    delay: [shear_speed, compression_speed].map(|speed| arrival.delay + rise / speed),
+                    factor: Vec2::new(
+                        direction.x + direction.dot(&shear_wave) / impedance,
+                        direction.y + direction.dot(&compression_wave) / impedance,
+                    ),
+                }));
+            }
+        }
+        let dashpots = Dashpots::new(all, trace(model, position, &points, &edges.base), mass);
+        Self { dashpots, incoming, waves: base.waves.clone(), impedance }
+    }
+
+    /// The half-space below each of the lowest nodes.
+    pub fn impedance(&self) -> &[Impedance] {
+        &self.impedance
+    }
+
+    /// The dashpots.
+    pub fn dashpots(&self) -> &Dashpots {
+        &self.dashpots
+    }
+
+    /// See [`Dashpots::begin_step`].
+    pub fn begin_step(&mut self, velocity: &[Vec2]) {
+        self.dashpots.begin_step(velocity);
+    }
+
+    /// See [`Dashpots::end_step`].
+    pub fn end_step(&mut self, time: f64, dt: f64, mass: &[f64], motion: (&mut [Vec2], &mut [Vec2])) {
+        let (incoming, waves) = (&self.incoming, &self.waves);
+        self.dashpots.end_step(dt, mass, motion, |k| {
+            incoming[k].map_or(0.0, |incoming| {
+                let (wave, [s, p]) = (&waves[incoming.wave], incoming.delay);
+                incoming.factor.x * wave.horizontal_at(time - s)
+                    + incoming.factor.y * wave.vertical_at(time - p)
+            })
+        });
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let waves = |wave: &UpgoingWave| 8 * (wave.horizontal.len() + wave.vertical.len());
+        self.dashpots.bytes()
+            + size_of_val(self.incoming.as_slice())
+            + size_of_val(self.impedance.as_slice())
+            + self.waves.iter().map(waves).sum::<usize>()
+    }
 }
 
 #[cfg(test)]
@@ -174,8 +398,24 @@ mod tests {
 
     #[test]
     fn the_wave_is_linear_between_samples_and_zero_outside() {
-        let wave = UpgoingWave { interval: 0.5, velocity: vec![1.0, 3.0] };
-        assert_eq!([-0.1, 0.0, 0.25, 0.5, 0.75, 1.1].map(|t| wave.at(t)), [0.0, 1.0, 2.0, 3.0, 1.5, 0.0]);
-        assert_eq!(wave.at(f64::NAN), 0.0);
+        let wave = UpgoingWave { interval: 0.5, horizontal: vec![1.0, 3.0], vertical: Vec::new() };
+        let times = [-0.1, 0.0, 0.25, 0.5, 0.75, 1.1];
+        assert_eq!(times.map(|t| wave.horizontal_at(t)), [0.0, 1.0, 2.0, 3.0, 1.5, 0.0]);
+        assert_eq!(times.map(|t| wave.vertical_at(t)), [0.0; 6]);
+        assert_eq!(wave.horizontal_at(f64::NAN), 0.0);
+    }
+
+    #[test]
+    fn a_segment_is_reached_at_its_delay_and_slowness() {
+        let segment = |from: f64, to: f64, delay: f64, slowness: f64| BaseSegment {
+            extent: [from, to],
+            wave: Some(0),
+            delay,
+            slowness,
+        };
+        let segments = vec![segment(0.0, 10.0, 0.0, 0.01), segment(10.0, 20.0, 0.5, 0.0)];
+        let base = Base { segments, ..Base::shaken_by(Some(UpgoingWave::default())) };
+        let late = |x: f64| base.at(x).delay;
+        assert_eq!([0.0, 5.0, 10.0, 11.0, 25.0].map(late), [0.0, 0.05, 0.1, 0.5, 0.5]);
     }
 }

@@ -121,11 +121,17 @@ impl Flow {
         4 * size_of_val(self.excess.as_slice()) + size_of_val(self.cofactor.as_slice()) + factors
     }
 
+    /// A weight of the excess pressure of node `i`, carried into the deformed frame.
+    #[inline]
+    pub fn carried(&self, i: usize, weight: Vec2) -> Vec2 {
+        self.cofactor[i].carry(weight)
+    }
+
     /// Force of the excess pressure on node `j`, kN/m: the exact transpose of the divergence.
     #[inline]
     pub fn force(&self, tables: &FlowTables, j: usize) -> Vec2 {
         let row = tables.divergence.transposed.iter_row(j);
-        row.map(|(i, weight)| self.cofactor[i].carry(*weight) * self.excess[i]).sum()
+        row.map(|(i, weight)| self.carried(i, *weight) * self.excess[i]).sum()
     }
 
     /// Advances the excess pressure by one step from the velocity field at its middle (Eq. 7) and the deformation of
@@ -265,7 +271,8 @@ fn surface_nodes(model: &Model) -> Vec<SurfaceNode> {
 mod tests {
     use super::*;
     use crate::{
-        geometry::{Geometry, Wall},
+        boundary::{Condition, Outline, Walls},
+        geometry::Geometry,
         model::Water,
         skeleton::tests::square_block,
     };
@@ -279,7 +286,7 @@ mod tests {
         const CONTRAST: f64 = 1e3;
         let mut model = square_block(SIDE);
         model.period = Some(Period { width: SIDE as f64 });
-        model.base_elevation = -0.5;
+        model.outline = Outline::level(-0.5);
         model.surface_elevation = vec![SIDE as f64 - 0.5; model.nodes()];
         model.water = Some(Water { unit_weight: 1.0, bulk_modulus: 1.0 });
         model.pore_pressure = vec![0.0; model.nodes()];
@@ -289,7 +296,8 @@ mod tests {
         }
         model.region = (0..model.nodes()).map(|node| u32::from(node >= model.nodes() / 2)).collect();
         let volume = vec![1.0; model.nodes()];
-        let geometry = Geometry::build(&model, &model.position, &volume, Wall::TRACTION, None);
+        let walls = (&model.outline, Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]));
+        let geometry = Geometry::build(&model, &model.position, &volume, walls, None);
         let diffusion = geometry.flow.unwrap().diffusion.unwrap();
         // Storage so small that a step of one second is steady.
         let stiffness = vec![1e12; model.nodes()];
@@ -330,7 +338,8 @@ mod tests {
         model.water = Some(Water { unit_weight: 10.0, bulk_modulus: 8.0 });
         model.regions[0].hydraulic_conductivity = CONDUCTIVITY;
         let volume = vec![1.0; model.nodes()];
-        let geometry = Geometry::build(&model, &model.position, &volume, Wall::TRACTION, None);
+        let walls = (&model.outline, Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]));
+        let geometry = Geometry::build(&model, &model.position, &volume, walls, None);
         let mut flow = Flow::new(&model, &Phases::new(&model), FlowScheme::ExplicitWithAcceleration).unwrap();
         let acceleration: Vec<Vec2> =
             model.position.iter().map(|x| Vec2::new(0.2 * x.x, 0.5 * x.y)).collect();

@@ -1,68 +1,75 @@
 //! Weight tables of the current geometry. They stay frozen while strains are small.
 
-use crate::model::{Model, Operators, STRESS_NODES, stress_node_offset};
+use crate::{
+    boundary::{Condition, Outline, Surroundings, Walls, id},
+    model::{Model, Operators, STRESS_NODES, stress_node_offset},
+};
 use sandboil_sph::{
-    Csr, GradientWeight, LeastSquaresFit, NeighbourList, Period, Source, Vec2, WendlandQuintic,
+    Csr, GradientWeight, LeastSquaresFit, Mat2, NeighbourList, Period, Vec2, WendlandQuintic,
     operators::{Member, consistent_fit, corrected_gradient, interpolation, laplacian_factor, stencil},
 };
-use std::ops::AddAssign;
+use std::ops::{AddAssign, MulAssign};
 
 /// Skin of the neighbour lists over the particle spacing: the lists survive displacements of half of it.
 const SKIN: f64 = 0.3;
 
-/// How a wall continues one velocity component across itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Parity {
-    /// No image: the component is free of the wall.
-    Free,
-    /// The image moves along (free slip).
-    Even,
-    /// The image moves against (held at zero on the wall).
-    Odd,
+/// How the velocity `(v_x, v_y)` of a node enters the gradients of both components at a stress node, 1/m.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct VectorWeight {
+    /// `grad v_x` is the sum of `x[0] v_x + x[1] v_y`.
+    pub x: [Vec2; 2],
+    /// `grad v_y` is the sum of `y[0] v_x + y[1] v_y`.
+    pub y: [Vec2; 2],
 }
 
-impl Parity {
-    /// Factor on the owner's component, zero where there is no image.
-    fn sign(self) -> f64 {
-        match self {
-            Self::Free => 0.0,
-            Self::Even => 1.0,
-            Self::Odd => -1.0,
+impl VectorWeight {
+    /// Each component by itself.
+    pub fn plain(gradient: Vec2) -> Self {
+        Self { x: [gradient, Vec2::zeros()], y: [Vec2::zeros(), gradient] }
+    }
+
+    /// One component by itself.
+    fn of_component(component: usize, gradient: Vec2, map: Mat2) -> Self {
+        let shown = [0, 1].map(|from| gradient * map[(component, from)]);
+        let nothing = [Vec2::zeros(); 2];
+        if component == 0 { Self { x: shown, y: nothing } } else { Self { x: nothing, y: shown } }
+    }
+
+    /// Largest of its parts, 1/m.
+    pub fn magnitude(&self) -> f64 {
+        self.x.iter().chain(&self.y).map(Vec2::amax).fold(0.0, f64::max)
+    }
+
+    /// Rows `grad v_x`, `grad v_y` of a node's velocity.
+    #[inline]
+    pub fn gradients(&self, v: Vec2) -> (Vec2, Vec2) {
+        (self.x[0] * v.x + self.x[1] * v.y, self.y[0] * v.x + self.y[1] * v.y)
+    }
+
+    /// The force on the node of a nominal stress `[xx, xy, yx, yy]`: the transpose of the gradients, less the sign.
+    #[inline]
+    pub fn contract(&self, [xx, xy, yx, yy]: [f64; 4]) -> Vec2 {
+        let (row_x, row_y) = (Vec2::new(xx, xy), Vec2::new(yx, yy));
+        Vec2::new(
+            self.x[0].dot(&row_x) + self.y[0].dot(&row_y),
+            self.x[1].dot(&row_x) + self.y[1].dot(&row_y),
+        )
+    }
+}
+
+impl AddAssign for VectorWeight {
+    fn add_assign(&mut self, other: Self) {
+        for (own, more) in self.x.iter_mut().chain(&mut self.y).zip(other.x.into_iter().chain(other.y)) {
+            *own += more;
         }
     }
 }
 
-/// What the base does to the velocity field: fixed in statics, a roller under the compliant base.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Wall {
-    /// Tangential (x) component.
-    pub tangential: Parity,
-    /// Normal (y) component.
-    pub normal: Parity,
-}
-
-impl Wall {
-    /// Fixed base of static stages.
-    pub const NO_SLIP: Self = Self { tangential: Parity::Odd, normal: Parity::Odd };
-    /// Vertical roller whose horizontal motion is left to tractions: the compliant base of `conservative`.
-    pub const TRACTION: Self = Self { tangential: Parity::Free, normal: Parity::Odd };
-    /// Free slip: the compliant base of `printed`, whose shear images are odd.
-    pub const FREE_SLIP: Self = Self { tangential: Parity::Even, normal: Parity::Odd };
-}
-
-/// What a wall adds to the gradient of each velocity component at a stress node.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct WallWeight {
-    /// Added to the weights of `grad v_x`, 1/m.
-    pub x: Vec2,
-    /// Added to the weights of `grad v_y`, 1/m.
-    pub y: Vec2,
-}
-
-impl AddAssign for WallWeight {
-    fn add_assign(&mut self, other: Self) {
-        self.x += other.x;
-        self.y += other.y;
+impl MulAssign<f64> for VectorWeight {
+    fn mul_assign(&mut self, factor: f64) {
+        for own in self.x.iter_mut().chain(&mut self.y) {
+            *own *= factor;
+        }
     }
 }
 
@@ -103,7 +110,7 @@ pub struct PrintedTables {
     pub interpolation: Csr<f64>,
     /// `V_j grad_i W_ij` from velocity node to real stress nodes.
     pub kernel_gradient: Csr<Vec2>,
-    /// The same to the mirrored stress nodes below the base; columns index `ghost_stress` rows.
+    /// The same to the mirrored stress nodes beyond the edges; columns index `ghost_stress` rows.
     pub ghost_gradient: Csr<Vec2>,
     /// Linear extrapolation of Eq. 11 from velocity nodes to mirrored stress nodes.
     pub ghost_stress: Csr<f64>,
@@ -111,6 +118,8 @@ pub struct PrintedTables {
     pub mirror_stress: Csr<f64>,
     /// Gradient of Eq. 9 at velocity nodes, for the pore pressure.
     pub pressure_gradient: Csr<Vec2>,
+    /// Whether a mirrored stress node lies below a base that carries no shear but the dashpots'.
+    pub odd_shear: Vec<bool>,
 }
 
 /// All weights of one geometry.
@@ -120,8 +129,8 @@ pub struct Geometry {
     pub gradient: Paired<GradientWeight>,
     /// Position covariance `(xx, xy, yy)` of each stress node's stencil, m2: the filter's linear part.
     pub covariance: Vec<[f64; 3]>,
-    /// What the base adds.
-    pub wall: Paired<WallWeight>,
+    /// What the images beyond base and sides add.
+    pub wall: Paired<VectorWeight>,
     /// Flow tables, if there is water.
     pub flow: Option<FlowTables>,
     /// Tables of the printed operators, if chosen.
@@ -132,6 +141,8 @@ pub struct Geometry {
 #[derive(Debug, Clone)]
 struct Lists {
     reference: Vec<Vec2>,
+    /// Owners of the sources: a node may have entered an edge's reach since.
+    owners: Vec<u32>,
     from_stress: NeighbourList,
     from_velocity: NeighbourList,
 }
@@ -142,34 +153,28 @@ pub fn stress_node_positions(position: &[Vec2], spacing: Vec2) -> Vec<Vec2> {
     position.iter().flat_map(|&x| [x + offset, x - offset]).collect()
 }
 
-/// Real nodes followed by their images in the base, within the kernel's reach of it.
-fn sources(position: &[Vec2], base: f64, reach: f64) -> Vec<Source> {
-    let real =
-        position.iter().enumerate().map(|(i, &position)| Source { owner: id(i), position, mirrored: false });
-    let mirrored = position.iter().enumerate().filter(|(_, x)| x.y - base < reach).map(|(i, x)| Source {
-        owner: id(i),
-        position: Vec2::new(x.x, 2.0 * base - x.y),
-        mirrored: true,
-    });
-    real.chain(mirrored).collect()
-}
-
-#[allow(clippy::cast_possible_truncation)] // node counts stay far below 2^32
-fn id(index: usize) -> u32 {
-    index as u32
-}
-
 /// Stencils of one query kind, cut to the kernel's support.
-struct Stencils<'a> {
-    sources: &'a [Source],
-    volume: &'a [f64],
-    kernel: WendlandQuintic,
-    period: Option<Period>,
+pub struct Stencils<'a> {
+    pub around: &'a Surroundings,
+    pub volume: &'a [f64],
+    pub kernel: WendlandQuintic,
+    pub period: Option<Period>,
 }
 
 impl Stencils<'_> {
-    fn all(&self, list: &NeighbourList, query: usize, at: Vec2) -> Vec<Member> {
-        stencil(list, query, at, self.sources, self.volume, self.kernel, self.period)
+    /// The members around one query of a list.
+    pub fn all(&self, list: &NeighbourList, query: usize, at: Vec2) -> Vec<Member> {
+        stencil(list, query, at, &self.around.sources, self.volume, self.kernel, self.period)
+    }
+
+    /// Those of `members` that show the velocity component: the nodes, and images of which `shows` is true.
+    fn showing(&self, members: &[Member], shows: impl Fn(&crate::boundary::Image) -> bool) -> Vec<Member> {
+        members.iter().copied().filter(|m| self.around.image(m.source).is_none_or(&shows)).collect()
+    }
+
+    /// Velocity of a member from that of its node.
+    fn map(&self, member: &Member) -> Mat2 {
+        self.around.image(member.source).map_or_else(Mat2::identity, |image| image.map)
     }
 }
 
@@ -183,13 +188,13 @@ impl Geometry {
         model: &Model,
         position: &[Vec2],
         volume: &[f64],
-        wall: Wall,
+        (outline, walls): (&Outline, Walls),
         previous: Option<Self>,
     ) -> Self {
         let kernel = WendlandQuintic::new(model.smoothing_length());
         let skin = SKIN * model.mean_spacing();
         // The lists may be older than the images' cut-off, so images reach one skin further than the kernel.
-        let sources = sources(position, model.base_elevation, kernel.support() + 2.0 * skin);
+        let around = Surroundings::new(position, outline, walls, kernel.support() + 2.0 * skin);
         let stress_position = stress_node_positions(position, model.spacing);
         let list = previous
             .map(|geometry| geometry.list)
@@ -198,29 +203,27 @@ impl Geometry {
                 !position.iter().zip(&list.reference).any(moved)
                     && list.from_stress.queries() == stress_position.len()
             })
-            .filter(|list| list.sources_match(position, model.base_elevation, kernel.support() + 2.0 * skin))
-            .unwrap_or_else(|| Lists {
-                reference: position.to_vec(),
-                from_stress: NeighbourList::build(
-                    &stress_position,
-                    &sources,
-                    kernel.support(),
-                    skin,
-                    model.period,
-                ),
-                from_velocity: NeighbourList::build(position, &sources, kernel.support(), skin, model.period),
+            .filter(|list| list.owners.iter().copied().eq(around.owners()))
+            .unwrap_or_else(|| {
+                let list = |queries: &[Vec2]| {
+                    NeighbourList::build(queries, &around.sources, kernel.support(), skin, model.period)
+                };
+                Lists {
+                    reference: position.to_vec(),
+                    owners: around.owners().collect(),
+                    from_stress: list(&stress_position),
+                    from_velocity: list(position),
+                }
             });
-        let stencils = Stencils { sources: &sources, volume, kernel, period: model.period };
+        let stencils = Stencils { around: &around, volume, kernel, period: model.period };
         let (gradient, covariance, wall_table) = match model.numerics.operators {
-            Operators::Conservative => {
-                least_squares_tables(&stencils, &list.from_stress, &stress_position, wall)
-            }
-            Operators::Printed => printed_strain_tables(&stencils, &list.from_stress, &stress_position, wall),
+            Operators::Conservative => least_squares_tables(&stencils, &list.from_stress, &stress_position),
+            Operators::Printed => printed_strain_tables(&stencils, &list.from_stress, &stress_position),
         };
         let flow =
-            model.water.is_some().then(|| flow_tables(model, &stencils, &list.from_velocity, position, wall));
+            model.water.is_some().then(|| flow_tables(model, &stencils, &list.from_velocity, position));
         let printed = (model.numerics.operators == Operators::Printed)
-            .then(|| printed_tables(model, &stencils, &list, position, &stress_position));
+            .then(|| printed_tables(&stencils, &list, position, &stress_position, (outline, walls)));
         let nodes = position.len();
         Self {
             gradient: Paired::new(gradient, nodes),
@@ -253,78 +256,67 @@ impl Geometry {
     }
 }
 
-impl Lists {
-    /// Whether the images are those the lists were made with (a node may have entered the wall's reach).
-    fn sources_match(&self, position: &[Vec2], base: f64, reach: f64) -> bool {
-        position
-            .iter()
-            .zip(&self.reference)
-            .all(|(now, then)| (now.y - base < reach) == (then.y - base < reach))
+type StrainTables = (Csr<GradientWeight>, Vec<[f64; 3]>, Csr<VectorWeight>);
+
+/// Gradient weights at a stress node: those of the nodes around it by themselves, the covariance of their places,
+/// and what images change. Nothing for a detached grain (no plane neighbourhood): it strains no more and carries no
+/// force.
+pub struct StrainRow {
+    /// Node and its weight, without images.
+    pub free: Vec<(u32, GradientWeight)>,
+    /// Position covariance `(xx, xy, yy)`, m2.
+    pub covariance: [f64; 3],
+    /// What images add for each node.
+    pub walls: Vec<(u32, VectorWeight)>,
+}
+
+impl StrainRow {
+    /// Least-squares gradient. Each velocity component is fitted to the nodes and to the images that show it.
+    pub fn least_squares(stencils: &Stencils, members: &[Member]) -> Option<Self> {
+        let real = real_only(members);
+        let fit = LeastSquaresFit::new(&real, stencils.kernel).ok()?;
+        let free: Vec<_> = real.iter().enumerate().map(|(k, m)| (m.owner, fit.weight(k, m))).collect();
+        let c = fit.covariance();
+        let mut walls = Vec::new();
+        for component in [0, 1] {
+            let seen = stencils.showing(members, |image| image.strain[component]);
+            if seen.len() == real.len() {
+                continue;
+            }
+            let Ok(full) = LeastSquaresFit::new(&seen, stencils.kernel) else { continue };
+            walls.extend(seen.iter().enumerate().map(|(k, m)| {
+                let gradient = full.weight(k, m).gradient;
+                (m.owner, VectorWeight::of_component(component, gradient, stencils.map(m)))
+            }));
+            walls.extend(free.iter().map(|(owner, weight)| {
+                (*owner, VectorWeight::of_component(component, -weight.gradient, Mat2::identity()))
+            }));
+        }
+        Some(Self { free, covariance: [c.m11, c.m12, c.m22], walls })
     }
 }
 
-type StrainTables = (Csr<GradientWeight>, Vec<[f64; 3]>, Csr<WallWeight>);
-
-/// Least-squares gradient, with the wall's share apart: images change the fit of each component differently.
-fn least_squares_tables(
-    stencils: &Stencils,
-    list: &NeighbourList,
-    points: &[Vec2],
-    wall: Wall,
-) -> StrainTables {
+fn least_squares_tables(stencils: &Stencils, list: &NeighbourList, points: &[Vec2]) -> StrainTables {
     let mut gradient = Csr::with_capacity(points.len(), list.pairs());
     let mut walls = Csr::with_capacity(points.len(), 0);
     let mut covariance = Vec::with_capacity(points.len());
     for (s, &at) in points.iter().enumerate() {
-        let members = stencils.all(list, s, at);
-        let real = real_only(&members);
-        let mut row = Vec::with_capacity(real.len());
-        let mut wall_row = Vec::new();
-        // A detached grain (no plane neighbourhood) strains no more and carries no force.
-        if let Ok(fit) = LeastSquaresFit::new(&real, stencils.kernel) {
-            row.extend(real.iter().enumerate().map(|(k, m)| (m.owner, fit.weight(k, m))));
-            let c = fit.covariance();
-            covariance.push([c.m11, c.m12, c.m22]);
-            if real.len() < members.len()
-                && let Ok(full) = LeastSquaresFit::new(&members, stencils.kernel)
-            {
-                for (k, m) in members.iter().enumerate() {
-                    let g = full.weight(k, m).gradient;
-                    let seen = |parity: Parity| match (parity, m.mirrored) {
-                        (Parity::Free, _) => Vec2::zeros(),
-                        (_, false) => g,
-                        (parity, true) => g * parity.sign(),
-                    };
-                    wall_row.push((m.owner, WallWeight { x: seen(wall.tangential), y: seen(wall.normal) }));
-                }
-                for (owner, weight) in &row {
-                    let undone = |parity: Parity| {
-                        if parity == Parity::Free { Vec2::zeros() } else { -weight.gradient }
-                    };
-                    let weight = WallWeight { x: undone(wall.tangential), y: undone(wall.normal) };
-                    wall_row.push((*owner, weight));
-                }
-            }
-        } else {
-            covariance.push([0.0; 3]);
-        }
-        gradient.push_row(&mut row);
-        walls.push_row(&mut wall_row);
+        let row = StrainRow::least_squares(stencils, &stencils.all(list, s, at));
+        let mut row = row.unwrap_or(StrainRow { free: Vec::new(), covariance: [0.0; 3], walls: Vec::new() });
+        gradient.push_row(&mut row.free);
+        walls.push_row(&mut row.walls);
+        covariance.push(row.covariance);
     }
     (gradient, covariance, walls)
 }
 
 /// Eq. 8 with the corrected kernel gradient and the linear fit as value at the stress node.
-fn printed_strain_tables(
-    stencils: &Stencils,
-    list: &NeighbourList,
-    points: &[Vec2],
-    wall: Wall,
-) -> StrainTables {
+fn printed_strain_tables(stencils: &Stencils, list: &NeighbourList, points: &[Vec2]) -> StrainTables {
     let mut gradient = Csr::with_capacity(points.len(), list.pairs());
     let mut walls = Csr::with_capacity(points.len(), 0);
     for (s, &at) in points.iter().enumerate() {
-        let members = stencils.all(list, s, at);
+        let members =
+            stencils.showing(&stencils.all(list, s, at), |image| image.strain[0] && image.strain[1]);
         let (mut row, mut wall_row) = (Vec::new(), Vec::new());
         let corrected = corrected_gradient(&members, stencils.kernel);
         let fit = LeastSquaresFit::new(&members, stencils.kernel);
@@ -333,8 +325,8 @@ fn printed_strain_tables(
             for (k, (m, g)) in members.iter().zip(&corrected).enumerate() {
                 let weight = g - total * fit.value_weight(k, m);
                 if m.mirrored {
-                    let image = |parity: Parity| weight * parity.sign();
-                    wall_row.push((m.owner, WallWeight { x: image(wall.tangential), y: image(wall.normal) }));
+                    let map = stencils.map(m);
+                    wall_row.extend([0, 1].map(|c| (m.owner, VectorWeight::of_component(c, weight, map))));
                 } else {
                     row.push((m.owner, GradientWeight { gradient: weight, share: 0.0 }));
                 }
@@ -347,33 +339,41 @@ fn printed_strain_tables(
     (gradient, covariance, walls)
 }
 
-/// Divergence and diffusion at velocity nodes (Eq. 7), images folded: velocity by the wall's parities, head even.
-fn flow_tables(
-    model: &Model,
-    stencils: &Stencils,
-    list: &NeighbourList,
-    points: &[Vec2],
-    wall: Wall,
-) -> FlowTables {
+/// Weights of the divergence at velocity node `own`, one component of the velocity after the other (last term of
+/// Eq. 7): each from the nodes and the images that show it.
+pub fn divergence_row(stencils: &Stencils, members: &[Member], own: u32) -> Vec<(u32, Vec2)> {
+    let mut row = Vec::new();
+    for component in [0, 1] {
+        let seen = stencils.showing(members, |image| image.flow[component]);
+        let Ok(corrected) = corrected_gradient(&seen, stencils.kernel) else { continue };
+        for (m, g) in seen.iter().zip(&corrected) {
+            let map = stencils.map(m);
+            row.push((m.owner, Vec2::new(map[(component, 0)], map[(component, 1)]) * g[component]));
+            let mut own_share = Vec2::zeros();
+            own_share[component] = -g[component];
+            row.push((own, own_share));
+        }
+    }
+    row
+}
+
+/// Divergence and diffusion at velocity nodes (Eq. 7), images folded: velocity by what they show of it, head even.
+fn flow_tables(model: &Model, stencils: &Stencils, list: &NeighbourList, points: &[Vec2]) -> FlowTables {
     let mut divergence = Csr::with_capacity(points.len(), list.pairs());
     let mut diffusion = Csr::with_capacity(points.len(), list.pairs());
     let conductivity = |node: u32| model.regions[model.region[node as usize] as usize].hydraulic_conductivity;
     let drains = model.regions.iter().any(|region| region.hydraulic_conductivity > 0.0);
-    // A component free of the wall has no image to be odd in: its own mirror keeps the row complete.
-    let sign = |parity: Parity| if parity == Parity::Odd { -1.0 } else { 1.0 };
-    let image = Vec2::new(sign(wall.tangential), sign(wall.normal));
     for (i, &at) in points.iter().enumerate() {
         let own = id(i);
         let members = stencils.all(list, i, at);
-        let (mut row, mut head_row) = (Vec::new(), Vec::new());
-        if let Ok(corrected) = corrected_gradient(&members, stencils.kernel) {
+        let mut head_row = Vec::new();
+        if let Ok(corrected) = corrected_gradient(&members, stencils.kernel)
+            && drains
+        {
             let factor = laplacian_factor(&members, &corrected);
             // sum V x_ji D F~ of Eq. 7: zero on a full lattice, it keeps linear heads exact elsewhere.
             let first_moment: Vec2 = members.iter().zip(&factor).map(|(m, f)| m.offset * (2.0 * f)).sum();
             for ((m, g), f) in members.iter().zip(&corrected).zip(&factor) {
-                let seen = if m.mirrored { g.component_mul(&image) } else { *g };
-                row.push((m.owner, seen));
-                row.push((own, -g));
                 // The harmonic mean carries the flux across a contact of two soils exactly.
                 let (k_i, k_j) = (conductivity(own), conductivity(m.owner));
                 let k_mean = if k_i + k_j > 0.0 { 2.0 * k_i * k_j / (k_i + k_j) } else { 0.0 };
@@ -382,7 +382,7 @@ fn flow_tables(
                 head_row.push((own, -weight));
             }
         }
-        divergence.push_row(&mut row);
+        divergence.push_row(&mut divergence_row(stencils, &members, own));
         diffusion.push_row(&mut head_row);
     }
     let mut divergence = Paired::new(divergence, points.len());
@@ -392,22 +392,21 @@ fn flow_tables(
 
 /// Tables of Eqs 6, 9, 10 and 11 as printed.
 fn printed_tables(
-    model: &Model,
     velocity: &Stencils,
     list: &Lists,
     points: &[Vec2],
     stress_points: &[Vec2],
+    (outline, walls): (&Outline, Walls),
 ) -> PrintedTables {
-    let kernel = velocity.kernel;
+    let (kernel, period) = (velocity.kernel, velocity.period);
     // Eq. 6 and Eq. 10 gather from stress nodes, each with half its velocity node's volume.
     let stress_volume: Vec<f64> =
         velocity.volume.iter().flat_map(|v| [v / STRESS_NODES as f64; STRESS_NODES]).collect();
-    let stress_sources = sources(stress_points, model.base_elevation, kernel.support());
-    let ghosts: Vec<u32> = stress_sources.iter().filter(|s| s.mirrored).map(|s| s.owner).collect();
-    let ghost_of = |owner: u32| ghosts.binary_search(&owner).map_or(0, id);
-    let to_stress = NeighbourList::build(points, &stress_sources, kernel.support(), 0.0, model.period);
-    let stencils =
-        Stencils { sources: &stress_sources, volume: &stress_volume, kernel, period: model.period };
+    let around = Surroundings::new(stress_points, outline, walls, kernel.support());
+    let ghost_of = |source: u32| source - id(stress_points.len());
+    let to_stress = NeighbourList::build(points, &around.sources, kernel.support(), 0.0, period);
+    let stencils = Stencils { around: &around, volume: &stress_volume, kernel, period };
+    let ghosts = &around.sources[stress_points.len()..];
     let mut tables = PrintedTables {
         interpolation: Csr::with_capacity(points.len(), to_stress.pairs()),
         kernel_gradient: Csr::with_capacity(points.len(), to_stress.pairs()),
@@ -415,6 +414,7 @@ fn printed_tables(
         ghost_stress: Csr::with_capacity(ghosts.len(), 0),
         mirror_stress: Csr::with_capacity(ghosts.len(), 0),
         pressure_gradient: Csr::with_capacity(points.len(), list.from_velocity.pairs()),
+        odd_shear: Vec::with_capacity(ghosts.len()),
     };
     for (i, &at) in points.iter().enumerate() {
         let members = stencils.all(&to_stress, i, at);
@@ -425,8 +425,10 @@ fn printed_tables(
         let weigh = |m: &Member| kernel.gradient(m.offset) * m.volume;
         let mut row: Vec<_> = real.iter().map(|m| (m.owner, weigh(m))).collect();
         tables.kernel_gradient.push_row(&mut row);
+        // Where an edge is left to tractions no stress goes on beyond it.
+        let shown = stencils.showing(&members, |image| image.strain[0] || image.strain[1]);
         let mut row: Vec<_> =
-            members.iter().filter(|m| m.mirrored).map(|m| (ghost_of(m.owner), weigh(m))).collect();
+            shown.iter().filter(|m| m.mirrored).map(|m| (ghost_of(m.source), weigh(m))).collect();
         tables.ghost_gradient.push_row(&mut row);
 
         let real = real_only(&velocity.all(&list.from_velocity, i, at));
@@ -434,10 +436,11 @@ fn printed_tables(
         let mut row: Vec<_> = real.iter().zip(fit).map(|(m, (_, gradient))| (m.owner, gradient)).collect();
         tables.pressure_gradient.push_row(&mut row);
     }
-    for &ghost in &ghosts {
-        let at = stress_points[ghost as usize];
-        let beyond = Vec2::new(0.0, 2.0 * (model.base_elevation - at.y));
-        let real = real_only(&velocity.all(&list.from_stress, ghost as usize, at));
+    for (ghost, image) in ghosts.iter().zip(&around.images) {
+        let owner = ghost.owner as usize;
+        let at = stress_points[owner];
+        let beyond = ghost.position - at;
+        let real = real_only(&velocity.all(&list.from_stress, owner, at));
         let fit = consistent_fit(&real, kernel).unwrap_or_default();
         let mut row: Vec<_> = real
             .iter()
@@ -447,6 +450,7 @@ fn printed_tables(
         tables.ghost_stress.push_row(&mut row);
         let mut row: Vec<_> = real.iter().zip(&fit).map(|(m, (value, _))| (m.owner, *value)).collect();
         tables.mirror_stress.push_row(&mut row);
+        tables.odd_shear.push(image.below && walls.base == Condition::FreeSlip);
     }
     tables
 }
@@ -454,9 +458,9 @@ fn printed_tables(
 /// Gradient of Eq. 9 of a nodal field at the velocity nodes, unit of the field per m.
 pub fn consistent_gradient(model: &Model, position: &[Vec2], volume: &[f64], field: &[f64]) -> Vec<Vec2> {
     let kernel = WendlandQuintic::new(model.smoothing_length());
-    let sources = sources(position, f64::NEG_INFINITY, 0.0);
-    let list = NeighbourList::build(position, &sources, kernel.support(), 0.0, model.period);
-    let stencils = Stencils { sources: &sources, volume, kernel, period: model.period };
+    let around = Surroundings::bare(position);
+    let list = NeighbourList::build(position, &around.sources, kernel.support(), 0.0, model.period);
+    let stencils = Stencils { around: &around, volume, kernel, period: model.period };
     position
         .iter()
         .enumerate()
@@ -472,9 +476,9 @@ pub fn consistent_gradient(model: &Model, position: &[Vec2], volume: &[f64], fie
 pub fn point_weights(model: &Model, position: &[Vec2], points: &[Vec2]) -> Csr<f64> {
     let kernel = WendlandQuintic::new(model.smoothing_length());
     let volume = vec![0.0; position.len()];
-    let sources = sources(position, f64::NEG_INFINITY, 0.0);
-    let list = NeighbourList::build(points, &sources, kernel.support(), 0.0, model.period);
-    let stencils = Stencils { sources: &sources, volume: &volume, kernel, period: model.period };
+    let around = Surroundings::bare(position);
+    let list = NeighbourList::build(points, &around.sources, kernel.support(), 0.0, model.period);
+    let stencils = Stencils { around: &around, volume: &volume, kernel, period: model.period };
     let mut table = Csr::with_capacity(points.len(), list.pairs());
     for (k, &at) in points.iter().enumerate() {
         let members = stencils.all(&list, k, at);

@@ -6,9 +6,11 @@
 
 mod banded;
 pub mod base;
+pub mod boundary;
 mod deformation;
 pub mod error;
 mod flow;
+mod free_field;
 mod geometry;
 pub mod model;
 mod parallel;
@@ -23,7 +25,8 @@ mod soil_field;
 mod spectrum_tests;
 mod timestep;
 
-pub use base::UpgoingWave;
+pub use base::{Base, BaseSegment, HalfSpace, UpgoingWave, Vertical};
+pub use boundary::{Outline, Side, Support};
 pub use error::SolverError;
 pub use model::{AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, Water, stress_node_offset};
 pub use rayleigh::Rayleigh;

@@ -1,6 +1,6 @@
 //! What is solved: nodes, regions, water and numerical choices, checked once.
 
-use crate::error::SolverError;
+use crate::{boundary::Outline, error::SolverError};
 use sandboil_soil::Soil;
 use sandboil_sph::{Period, Vec2};
 
@@ -121,8 +121,8 @@ pub struct Model {
     pub gravity: f64,
     /// Width of the periodic section, if its sides are periodic.
     pub period: Option<Period>,
-    /// Elevation of the base, m.
-    pub base_elevation: f64,
+    /// Base and sides.
+    pub outline: Outline,
     /// Numerical choices.
     pub numerics: Numerics,
 }
@@ -198,6 +198,7 @@ impl Model {
         if let Some(period) = self.period {
             positive("period", period.width)?;
         }
+        self.outline.validate()?;
         for region in &self.regions {
             // Dry soil given by its weight alone counts as solid throughout; water needs pores.
             let least = if self.water.is_some() { f64::MIN_POSITIVE } else { 0.0 };

@@ -108,9 +108,7 @@ impl RayleighDamping {
     pub fn force(&self, geometry: &Geometry, j: usize, mass: f64, velocity: Vec2) -> Vec2 {
         let mut force = velocity * (-self.law.mass_coefficient() * mass);
         for (s, weight) in geometry.wall.transposed.iter_row(j) {
-            let [xx, xy, yx, yy] = self.tensor[s];
-            force.x -= xx * weight.x.x + xy * weight.x.y;
-            force.y -= yx * weight.y.x + yy * weight.y.y;
+            force -= weight.contract(self.tensor[s]);
         }
         force
     }
@@ -138,7 +136,7 @@ fn viscous_stress(point: &StressPoint, rate: &StrainIncrement, coefficient: f64)
 mod tests {
     use super::*;
     use crate::{
-        geometry::Wall,
+        boundary::{Condition, Outline, Walls},
         model::STRESS_NODES,
         skeleton::{conservative_force, tests::square_block},
     };
@@ -175,9 +173,10 @@ mod tests {
     #[test]
     fn the_force_is_in_proportion_to_stiffness_and_mass() {
         let mut model = square_block(6);
-        model.base_elevation = -0.5;
+        model.outline = Outline::level(-0.5);
         let nodes = model.nodes();
-        let geometry = Geometry::build(&model, &model.position, &vec![1.0; nodes], Wall::TRACTION, None);
+        let walls = (&model.outline, Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]));
+        let geometry = Geometry::build(&model, &model.position, &vec![1.0; nodes], walls, None);
         let velocity: Vec<Vec2> =
             (0..nodes).map(|j| Vec2::new((1.3 * j as f64).sin(), (2.1 * j as f64).cos())).collect();
         let still = vec![Vec2::zeros(); nodes];

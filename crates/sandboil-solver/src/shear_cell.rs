@@ -7,8 +7,9 @@
 //! only a set share of the confining stress, and it brakes before each reversal. So velocities need no resetting.
 
 use crate::{
+    boundary::{Outline, Walls},
     error::SolverError,
-    geometry::{Geometry, Wall, stress_node_positions},
+    geometry::{Geometry, stress_node_positions},
     model::{Model, Numerics, Region, STRESS_NODES, positive},
     parallel::{Rows, chunks, for_each_chunk},
     simulation::{CHECK_INTERVAL, Counters, RUNAWAY_SPEED, SHAKING_FACTOR, step_is_outgrown},
@@ -148,7 +149,7 @@ impl CellTest {
             water: None,
             gravity: STANDARD_GRAVITY,
             period: None,
-            base_elevation: f64::NEG_INFINITY,
+            outline: Outline::none(),
             numerics: self.numerics,
         };
         model.validate()?;
@@ -311,7 +312,8 @@ impl ShearCell {
         let (model, order, free) = test.model()?;
         let nodes = model.nodes();
         let volume = vec![model.spacing.x * model.spacing.y; nodes];
-        let geometry = Geometry::build(&model, &model.position, &volume, Wall::NO_SLIP, None);
+        let walls = (&model.outline, Walls::statics(&model.outline));
+        let geometry = Geometry::build(&model, &model.position, &volume, walls, None);
         let reached = |j: usize| geometry.gradient.transposed.iter_row(j).map(|(s, _)| s / STRESS_NODES + 1);
         let computed =
             if test.every_stress_node { nodes } else { (0..free).flat_map(reached).max().unwrap_or(free) };

@@ -1,11 +1,13 @@
 //! Stages and stepping: the leapfrog loop, the gravity relaxation and the switch between them.
 
 use crate::{
-    base::{CompliantBase, UpgoingWave, base_points, lowest_nodes},
+    base::{Base, CompliantBase, Impedance, Vertical},
+    boundary::{EdgeNodes, Outline, Walls, base_condition},
     deformation::Deformation,
     error::SolverError,
     flow::{Flow, FlowScheme},
-    geometry::{Geometry, Wall, consistent_gradient, point_weights, stress_node_positions},
+    free_field::{FreeField, Section},
+    geometry::{Geometry, consistent_gradient, point_weights, stress_node_positions},
     model::{AccelerationTerm, Diffusion, Model, Operators, STRESS_NODES},
     parallel::{Rows, chunks, for_each_chunk},
     phases::Phases,
@@ -54,10 +56,10 @@ pub struct Gravity {
 pub struct Shaking {
     /// Duration, s.
     pub duration: f64,
-    /// Upgoing wave at the base, if any.
-    pub wave: Option<UpgoingWave>,
-    /// Shear-wave speed (m/s) and density (Mg/m3) of the half-space, instead of the layer's own.
-    pub half_space: Option<(f64, f64)>,
+    /// The base and what comes through it.
+    pub base: Base,
+    /// Whether the left and the right side become free-field sides; else they stay the walls they are in statics.
+    pub free_field: [bool; 2],
     /// Local damping `xi_l` of Eq. 16.
     pub local_damping: f64,
     /// Rayleigh damping, if any.
@@ -85,6 +87,8 @@ pub struct Counters {
     pub flow_calls: u64,
     /// Calls of the base dashpots.
     pub base_calls: u64,
+    /// Steps with free-field sides.
+    pub free_field_calls: u64,
     /// Updates of plastic soil models.
     pub plastic_updates: u64,
     /// Geometries built.
@@ -108,6 +112,7 @@ enum Active {
 struct ActiveShaking {
     stage: Shaking,
     base: CompliantBase,
+    free_field: Option<FreeField>,
     coupling: PressureCoupling,
     probes: Probes,
     recorder: Recorder,
@@ -133,7 +138,13 @@ pub struct Simulation {
     threads: usize,
     pool: Option<rayon::ThreadPool>,
     geometry: Geometry,
-    wall: Wall,
+    walls: Walls,
+    edges: EdgeNodes,
+    /// Positions when the edges were let go, m; none while they are fixed.
+    released: Option<Vec<Vec2>>,
+    gravity: Option<Gravity>,
+    /// Whether this is a free-field column: the section beside it renews its geometry.
+    is_column: bool,
     initial_position: Vec<Vec2>,
     position: Vec<Vec2>,
     velocity: Vec<Vec2>,
@@ -172,7 +183,9 @@ impl Simulation {
             .transpose()
             .map_err(|error| SolverError::Threads { threads, reason: error.to_string() })?;
         let phases = Phases::new(&model);
-        let geometry = Geometry::build(&model, &model.position, phases.volume(), Wall::NO_SLIP, None);
+        let walls = Walls::statics(&model.outline);
+        let outline = (&model.outline, walls);
+        let geometry = Geometry::build(&model, &model.position, phases.volume(), outline, None);
         let mut points: Vec<StressPoint> = (0..STRESS_NODES * nodes)
             .map(|s| {
                 let region = &model.regions[model.region[s / STRESS_NODES] as usize];
@@ -187,7 +200,11 @@ impl Simulation {
             order,
             threads,
             pool,
-            wall: Wall::NO_SLIP,
+            walls,
+            edges: EdgeNodes::new(&model),
+            released: None,
+            gravity: None,
+            is_column: false,
             initial_position: model.position.clone(),
             position: model.position.clone(),
             velocity: vec![Vec2::zeros(); nodes],
@@ -222,7 +239,9 @@ impl Simulation {
     /// # Errors
     /// Elastic constants outside their range.
     pub fn begin_gravity(&mut self, stage: Gravity) -> Result<(), SolverError> {
-        self.set_wall(Wall::NO_SLIP);
+        self.gravity = Some(stage);
+        self.released = None;
+        self.set_walls(Walls::statics(&self.model.outline));
         self.soil = SoilField::elastic(&self.model, &mut self.points)?;
         self.flow = None;
         self.rayleigh = None;
@@ -270,14 +289,21 @@ impl Simulation {
             }
         }
         self.rayleigh = stage.rayleigh.map(|law| RayleighDamping::new(law, self.points.len()));
-        let goes_on = matches!(self.active, Active::Shaking(_));
+        let absorbs = stage.base.vertical == Vertical::Absorbing;
+        // Another stage of shaking keeps the columns of the one before.
+        let (goes_on, free_field) = match std::mem::replace(&mut self.active, Active::None) {
+            Active::Shaking(before) => (true, before.free_field),
+            _ => (false, None),
+        };
         if goes_on {
-            self.renew_geometry();
+            self.renew_geometry(None);
         } else {
-            self.set_wall(match self.model.numerics.operators {
-                Operators::Conservative => Wall::TRACTION,
-                Operators::Printed => Wall::FREE_SLIP,
-            });
+            self.released = Some(self.position.clone());
+            self.set_walls(Walls::shaken(
+                &self.model.outline,
+                base_condition(self.model.numerics.operators, absorbs),
+                stage.free_field,
+            ));
             self.velocity.fill(Vec2::zeros());
             self.acceleration.fill(Vec2::zeros());
             self.soil = SoilField::plastic(&self.model, &mut self.points, None)?;
@@ -286,8 +312,18 @@ impl Simulation {
         for point in &mut self.points {
             point.strain = [0.0; 3];
         }
-        let impedance = self.base_impedance(stage.half_space)?;
-        let base = CompliantBase::new(&self.model, &self.position, &self.mass, impedance, stage.wave.clone());
+        let impedance = self.base_impedance(&stage.base)?;
+        let edges = (&self.edges, self.position.as_slice());
+        let base = CompliantBase::new(&self.model, edges, &self.mass, impedance, &stage.base);
+        let outline = self.present_outline();
+        let section = self.section(&outline);
+        let free_field = match free_field {
+            Some(mut free_field) => {
+                free_field.begin_shaking(&section, &stage)?;
+                Some(free_field)
+            }
+            None => FreeField::new(&section, stage.free_field, self.gravity, &stage)?,
+        };
         let scheme = self.flow_scheme(stage.time_step_factor);
         let excess = self.flow.take().map(|flow| flow.excess);
         self.flow = Flow::new(&self.model, &self.phases, scheme);
@@ -299,7 +335,7 @@ impl Simulation {
             (_, FlowScheme::Implicit) => PressureCoupling::Implicit,
             _ => PressureCoupling::Explicit,
         };
-        (self.dt, self.criterion) = self.limit(coupling, stage.time_step_factor);
+        (self.dt, self.criterion) = self.shared_limit(coupling, stage.time_step_factor, free_field.as_ref());
         let stress_position = stress_node_positions(&self.position, self.model.spacing);
         let probes = Probes {
             velocity: point_weights(&self.model, &self.position, &stage.probes),
@@ -317,6 +353,7 @@ impl Simulation {
                 .then(|| vec![0.0; self.model.nodes()]),
             strain_envelope: stage.strain_envelope.then(|| vec![0.0; self.points.len()]),
             base,
+            free_field,
             coupling,
             probes,
             stage,
@@ -328,7 +365,7 @@ impl Simulation {
     }
 
     /// Makes the present state one of rest: the constant forces balance whatever stress and pressure leave over.
-    fn store_reaction(&mut self) {
+    pub(crate) fn store_reaction(&mut self) {
         self.constant_force = self.static_force().iter().map(|force| -force).collect();
     }
 
@@ -339,19 +376,50 @@ impl Simulation {
         (0..self.model.nodes()).map(|j| self.internal_force(j, Vec2::zeros())).collect()
     }
 
-    /// Builds the geometry anew under way. A strained lattice meets other weights than the one it came from; the
-    /// difference they make to the force of the present stresses stays as a constant force, so that the soil is
-    /// not struck by the change: blows of a few hundredths of gravity would liquefy it further.
-    fn renew_geometry(&mut self) {
-        let before = self.static_force();
+    /// Builds the geometry anew under way, and with it that of free-field columns. A strained lattice meets other
+    /// weights than the one it came from; the difference they make to the force of the present stresses stays as a
+    /// constant force, so that the soil is not struck by the change: blows of a few hundredths of gravity would liquefy
+    /// it further.
+    pub(crate) fn renew_geometry(&mut self, free_field: Option<&mut FreeField>) {
+        let mut before = self.static_force();
         self.rebuild_geometry();
         let after = self.static_force();
+        if let Some(free_field) = free_field {
+            free_field.add_force(&mut before);
+            free_field.renew_columns();
+            let outline = self.present_outline();
+            free_field.renew(&self.section(&outline));
+        }
         for ((constant, before), after) in self.constant_force.iter_mut().zip(before).zip(after) {
             *constant += before - after;
         }
         let velocity = std::mem::take(&mut self.velocity);
         self.refresh_shares(&velocity);
         self.velocity = velocity;
+    }
+
+    /// The edges where they now stand: in shaking they go with the nodes along them, as far as they are free to.
+    fn present_outline(&self) -> Outline {
+        let Some(released) = &self.released else { return self.model.outline.clone() };
+        let moved = |nodes: &[usize], free: [bool; 2]| {
+            let total: Vec2 = nodes.iter().map(|&node| self.position[node] - released[node]).sum();
+            let mean = total / nodes.len().max(1) as f64;
+            Vec2::new(if free[0] { mean.x } else { 0.0 }, if free[1] { mean.y } else { 0.0 })
+        };
+        let sides = [0, 1].map(|k| moved(&self.edges.sides[k], self.walls.sides[k].lets_go()));
+        self.model.outline.moved(moved(&self.edges.base, self.walls.base.lets_go()), sides)
+    }
+
+    fn section<'a>(&'a self, outline: &'a Outline) -> Section<'a> {
+        Section {
+            model: &self.model,
+            outline,
+            walls: self.walls,
+            edges: &self.edges,
+            position: &self.position,
+            phases: &self.phases,
+            mass: &self.mass,
+        }
     }
 
     /// Gives the section an excess pore pressure (kPa, user's node order) before the first step of shaking, held
@@ -364,7 +432,7 @@ impl Simulation {
         if found != expected {
             return Err(SolverError::Shape { name: "excess_pore_pressure", found, expected });
         }
-        let (Active::Shaking(_), 0, Some(flow)) = (&self.active, self.step, &mut self.flow) else {
+        let (Active::Shaking(shaking), 0, Some(flow)) = (&mut self.active, self.step, &mut self.flow) else {
             return Err(SolverError::Order {
                 call: "set_excess_pore_pressure",
                 needs: "water and a shaking stage that has just begun",
@@ -372,6 +440,9 @@ impl Simulation {
         };
         for (slot, &user) in flow.excess.iter_mut().zip(&self.order) {
             *slot = excess[user];
+        }
+        if let Some(free_field) = &mut shaking.free_field {
+            free_field.set_excess(&self.edges, &flow.excess);
         }
         self.store_reaction();
         Ok(())
@@ -383,9 +454,9 @@ impl Simulation {
         self.step = 0;
     }
 
-    fn set_wall(&mut self, wall: Wall) {
-        if wall != self.wall {
-            self.wall = wall;
+    fn set_walls(&mut self, walls: Walls) {
+        if walls != self.walls {
+            self.walls = walls;
             self.rebuild_geometry();
         }
     }
@@ -394,8 +465,9 @@ impl Simulation {
         // The tables are replaced as a whole; the lists of the old ones serve while no node left their skin.
         let previous = self.geometry.clone();
         self.follow_volumes();
-        let volume = self.phases.volume();
-        self.geometry = Geometry::build(&self.model, &self.position, volume, self.wall, Some(previous));
+        let (volume, outline) = (self.phases.volume(), self.present_outline());
+        let walls = (&outline, self.walls);
+        self.geometry = Geometry::build(&self.model, &self.position, volume, walls, Some(previous));
         if let Some(flow) = &mut self.flow {
             flow.geometry_changed(&self.model, &self.phases);
         }
@@ -489,20 +561,30 @@ impl Simulation {
         (factor * dt, criterion)
     }
 
-    /// `rho_m C_s` of the layer above each base point, from the model's small-strain modulus at the base's
-    /// stress, or of the half-space that was given.
-    fn base_impedance(&self, half_space: Option<(f64, f64)>) -> Result<Vec<f64>, SolverError> {
-        let points = base_points(&self.model, &self.position);
-        if let Some((speed, density)) = half_space {
-            return Ok(vec![density * speed; points.len()]);
-        }
+    /// The same, and no longer than free-field columns allow.
+    fn shared_limit(
+        &self,
+        coupling: PressureCoupling,
+        factor: f64,
+        free_field: Option<&FreeField>,
+    ) -> (f64, Criterion) {
+        let columns = free_field.into_iter().flat_map(FreeField::columns);
+        columns
+            .map(|column| column.limit(coupling, factor))
+            .fold(self.limit(coupling, factor), |least, limit| if limit.0 < least.0 { limit } else { least })
+    }
+
+    /// The half-space below each base point: as given, or of the layer above it, with the model's small-strain moduli at
+    /// the base's stress.
+    fn base_impedance(&self, base: &Base) -> Result<Vec<Impedance>, SolverError> {
+        let points = self.edges.base_points(&self.model, &self.position);
         let stress_position = stress_node_positions(&self.position, self.model.spacing);
         let weights = point_weights(&self.model, &stress_position, &points);
-        lowest_nodes(&self.model, &self.position)
+        self.edges
+            .base
+            .iter()
             .enumerate()
-            .map(|(point, node)| {
-                let region = self.model.region[node] as usize;
-                let density = self.model.mixture_density(region);
+            .map(|(point, &node)| {
                 let at_base = |component: &dyn Fn(&Stress) -> f64| -> f64 {
                     weights.iter_row(point).map(|(s, w)| w * component(&self.points[s].stress)).sum()
                 };
@@ -512,16 +594,31 @@ impl Simulation {
                     xy: at_base(&|s| s.xy),
                     zz: at_base(&|s| s.zz),
                 };
-                let moduli = self.model.regions[region].soil.small_strain_moduli(stress);
-                let moduli = moduli.map_err(|source| SolverError::Soil { region, node, source })?;
-                Ok((density * moduli.shear).sqrt())
+                let Some(given) = base.half_space else { return self.impedance_at(node, stress) };
+                // Without a compression-wave speed nothing needs one: a level roller base.
+                let compression_speed = given.compression_speed.unwrap_or(given.shear_speed);
+                Ok(Impedance { density: given.density, shear_speed: given.shear_speed, compression_speed })
             })
             .collect()
     }
 
+    /// Density and small-strain wave speeds of the soil of a node at a stress; the compression wave's undrained.
+    fn impedance_at(&self, node: usize, stress: Stress) -> Result<Impedance, SolverError> {
+        let region = self.model.region[node] as usize;
+        let density = self.model.mixture_density(region);
+        let moduli = self.model.regions[region].soil.small_strain_moduli(stress);
+        let moduli = moduli.map_err(|source| SolverError::Soil { region, node, source })?;
+        let water = self.model.water_stiffness(self.model.regions[region].porosity);
+        Ok(Impedance {
+            density,
+            shear_speed: (moduli.shear / density).sqrt(),
+            compression_speed: ((moduli.bulk + 4.0 / 3.0 * moduli.shear + water) / density).sqrt(),
+        })
+    }
+
     fn prepare_printed_stress(&mut self) {
         if let (Some(stress), Some(tables)) = (&mut self.printed_stress, &self.geometry.printed) {
-            stress.update(tables, &self.points, self.wall == Wall::FREE_SLIP);
+            stress.update(tables, &self.points);
         }
     }
 
@@ -714,8 +811,19 @@ impl Simulation {
     fn shaking_step_with(&mut self, shaking: &mut ActiveShaking) -> Result<(), SolverError> {
         let dt = self.dt;
         shaking.base.begin_step(&self.velocity);
+        if let Some(free_field) = &mut shaking.free_field {
+            free_field.begin_step(dt, &self.velocity)?;
+        }
         self.accelerate(dt);
-        shaking.base.end_step(self.time, dt, &self.mass, &mut self.velocity, &mut self.acceleration);
+        let motion = (self.velocity.as_mut_slice(), self.acceleration.as_mut_slice());
+        if let Some(free_field) = &shaking.free_field {
+            free_field.push(dt, &self.mass, motion.0, motion.1);
+        }
+        shaking.base.end_step(self.time, dt, &self.mass, (&mut *motion.0, &mut *motion.1));
+        if let Some(free_field) = &mut shaking.free_field {
+            free_field.end_step(dt, &self.mass, motion.0, motion.1);
+            self.counters.free_field_calls += 1;
+        }
         if shaking.stage.local_damping > 0.0 {
             self.damp_locally(shaking.stage.local_damping, dt);
         }
@@ -752,16 +860,23 @@ impl Simulation {
             let value = flow.excess[j];
             return Err(self.diverged("pore pressure", j, value));
         }
-        let (target, criterion) = self.limit(shaking.coupling, shaking.stage.time_step_factor);
+        let factor = shaking.stage.time_step_factor;
+        let (target, criterion) = self.shared_limit(shaking.coupling, factor, shaking.free_field.as_ref());
         if step_is_outgrown(self.dt, target) {
             (self.dt, self.criterion) = (target, criterion);
             self.counters.time_step_changes += 1;
         }
-        let limit = self.model.numerics.geometry_strain_limit();
-        if self.points.iter().any(|point| point.deformation.magnitude() > limit) {
-            self.renew_geometry();
+        let column_strained = shaking.free_field.iter().flat_map(FreeField::columns).any(Self::is_strained);
+        if !self.is_column && (self.is_strained() || column_strained) {
+            self.renew_geometry(shaking.free_field.as_mut());
         }
         Ok(())
+    }
+
+    /// Whether some stress node is strained beyond what its weights bear.
+    fn is_strained(&self) -> bool {
+        let limit = self.model.numerics.geometry_strain_limit();
+        self.points.iter().any(|point| point.deformation.magnitude() > limit)
     }
 
     /// Envelopes and histories at the beginning of the step, when the accelerations are known and nothing has
@@ -843,6 +958,73 @@ impl Simulation {
         }
     }
 
+    // What a section reads of a free-field column, by internal index.
+
+    /// Makes this simulation a column that follows a section's steps.
+    pub(crate) fn column_step(&mut self, dt: f64) -> Result<(), SolverError> {
+        self.is_column = true;
+        self.dt = dt;
+        self.shaking_step()
+    }
+
+    /// Internal index of every node, in the user's order.
+    pub(crate) fn internal_order(&self) -> Vec<usize> {
+        let mut internal = vec![0; self.order.len()];
+        for (j, &user) in self.order.iter().enumerate() {
+            internal[user] = j;
+        }
+        internal
+    }
+
+    /// Velocity of a node, m/s.
+    pub(crate) fn velocity_of(&self, node: usize) -> Vec2 {
+        self.velocity[node]
+    }
+
+    /// All stress nodes.
+    pub(crate) fn stress_points(&self) -> &[StressPoint] {
+        &self.points
+    }
+
+    /// Excess pore pressure of all nodes, kPa; empty without water.
+    pub(crate) fn excess(&self) -> &[f64] {
+        self.flow.as_ref().map_or(&[], |flow| &flow.excess)
+    }
+
+    /// Sets the excess pore pressure of a node, kPa.
+    pub(crate) fn set_excess_at(&mut self, node: usize, excess: f64) {
+        if let Some(flow) = &mut self.flow {
+            flow.excess[node] = excess;
+        }
+    }
+
+    /// A weight of a node's excess pressure as its water carries it into the deformed frame.
+    pub(crate) fn carried_by_water(&self, node: usize, weight: Vec2) -> Vec2 {
+        self.flow.as_ref().map_or(weight, |flow| flow.carried(node, weight))
+    }
+
+    /// Traction of the compliant base in the last step, mean over its points, kPa.
+    pub(crate) fn base_traction(&self) -> Vec2 {
+        let Active::Shaking(shaking) = &self.active else { return Vec2::zeros() };
+        let dashpots = shaking.base.dashpots();
+        let total: Vec2 =
+            dashpots.all().iter().zip(dashpots.traction()).map(|(d, traction)| d.direction * *traction).sum();
+        total / self.edges.base.len().max(1) as f64
+    }
+
+    /// Density and small-strain wave speeds at a node's own stress.
+    pub(crate) fn small_strain_impedance(&self, node: usize) -> Result<Impedance, SolverError> {
+        let [one, other] = [0, 1].map(|k| self.points[STRESS_NODES * node + k].stress);
+        let mean = |a: f64, b: f64| 0.5 * (a + b);
+        let stress = Stress {
+            xx: mean(one.xx, other.xx),
+            yy: mean(one.yy, other.yy),
+            xy: mean(one.xy, other.xy),
+            zz: mean(one.zz, other.zz),
+        };
+        self.impedance_at(node, stress)
+    }
+
     /// Time in the stage, s.
     pub fn time(&self) -> f64 {
         self.time
@@ -899,7 +1081,9 @@ impl Simulation {
     /// Dashpot coefficients of the base points, kPa s/m; empty without a compliant base.
     pub fn base_impedances(&self) -> Vec<f64> {
         match &self.active {
-            Active::Shaking(shaking) => shaking.base.impedance().to_vec(),
+            Active::Shaking(shaking) => {
+                shaking.base.impedance().iter().map(|below| below.density * below.shear_speed).collect()
+            }
             _ => Vec::new(),
         }
     }
@@ -927,6 +1111,9 @@ impl Simulation {
         }
         if let Active::Shaking(shaking) = &self.active {
             arrays.push(("base", shaking.base.bytes()));
+            if let Some(free_field) = &shaking.free_field {
+                arrays.push(("free_field", free_field.bytes()));
+            }
             if let Some(envelope) = &shaking.pressure_envelope {
                 arrays.push(("pressure_envelope", size_of_val(envelope.as_slice())));
             }
@@ -1052,7 +1239,8 @@ fn channel_names(water: bool, stress: bool) -> Vec<&'static str> {
 /// The model with nodes sorted by region, then by row and column of the lattice, and the user's index of each:
 /// soil loops run over contiguous rows of one law, and neighbours lie near in memory.
 fn sorted(model: &Model) -> (Model, Vec<usize>) {
-    let row = |i: usize| ((model.position[i].y - model.base_elevation) / model.spacing.y).floor();
+    let lowest = model.position.iter().map(|x| x.y).fold(f64::INFINITY, f64::min);
+    let row = |i: usize| ((model.position[i].y - lowest) / model.spacing.y).round();
     let mut order: Vec<usize> = (0..model.nodes()).collect();
     order.sort_by(|&a, &b| {
         let key = |i: usize| (model.region[i], row(i), model.position[i].x);

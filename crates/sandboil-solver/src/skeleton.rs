@@ -74,8 +74,9 @@ pub fn motion(geometry: &Geometry, s: usize, velocity: &[Vec2]) -> Motion {
     let (free_x, free_y) = (x, y);
     for (j, weight) in geometry.wall.forward.iter_row(s) {
         let v_j = velocity[j];
-        x += weight.x * v_j.x;
-        y += weight.y * v_j.y;
+        let (more_x, more_y) = weight.gradients(v_j);
+        x += more_x;
+        y += more_y;
     }
     Motion { x, y, free_x, free_y, mean_velocity }
 }
@@ -144,9 +145,7 @@ pub fn conservative_force(
     }
     for (s, weight) in geometry.wall.transposed.iter_row(j) {
         let StressPoint { stress, volume, deformation, .. } = &points[s];
-        let [xx, xy, yx, yy] = deformation.cofactor().nominal(stress);
-        force.x -= volume * (xx * weight.x.x + xy * weight.x.y);
-        force.y -= volume * (yx * weight.y.x + yy * weight.y.y);
+        force -= weight.contract(deformation.cofactor().nominal(stress)) * *volume;
     }
     force
 }
@@ -168,7 +167,7 @@ fn sign(value: f64) -> f64 {
 pub struct PrintedStress {
     /// Effective stress `(xx, yy, xy)` at velocity nodes, Eq. 10.
     node: Vec<[f64; 3]>,
-    /// The same at the mirrored stress nodes below the base, Eq. 11.
+    /// The same at the mirrored stress nodes beyond the edges, Eq. 11.
     ghost: Vec<[f64; 3]>,
 }
 
@@ -178,9 +177,9 @@ impl PrintedStress {
         size_of_val(self.node.as_slice()) + size_of_val(self.ghost.as_slice())
     }
 
-    /// Evaluates Eqs 10 and 11. With `odd_shear` the ghosts' shear mirrors with opposite sign: a base that
-    /// carries no shear but the dashpots'.
-    pub fn update(&mut self, tables: &PrintedTables, points: &[StressPoint], odd_shear: bool) {
+    /// Evaluates Eqs 10 and 11. Below a base that carries no shear but the dashpots' the ghosts' shear mirrors with
+    /// opposite sign.
+    pub fn update(&mut self, tables: &PrintedTables, points: &[StressPoint]) {
         self.node.clear();
         self.node.extend((0..tables.interpolation.rows()).map(|i| {
             tables.interpolation.iter_row(i).fold([0.0; 3], |sum, (s, &w)| {
@@ -194,8 +193,11 @@ impl PrintedStress {
             let fitted = |table: &sandboil_sph::Csr<f64>, component: usize| -> f64 {
                 table.iter_row(b).map(|(j, w)| w * node[j][component]).sum()
             };
-            let shear =
-                if odd_shear { -fitted(&tables.mirror_stress, 2) } else { fitted(&tables.ghost_stress, 2) };
+            let shear = if tables.odd_shear[b] {
+                -fitted(&tables.mirror_stress, 2)
+            } else {
+                fitted(&tables.ghost_stress, 2)
+            };
             [fitted(&tables.ghost_stress, 0), fitted(&tables.ghost_stress, 1), shear]
         }));
     }
@@ -231,7 +233,7 @@ pub fn maximum_shear_strain([xx, yy, xy]: [f64; 3]) -> f64 {
 pub(crate) mod tests {
     use super::*;
     use crate::{
-        geometry::Wall,
+        boundary::{Condition, Outline, Walls},
         model::{AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, STRESS_NODES},
     };
     use proptest::prelude::*;
@@ -276,7 +278,7 @@ pub(crate) mod tests {
             water: None,
             gravity: 10.0,
             period,
-            base_elevation: -100.0,
+            outline: Outline::level(-100.0),
             numerics: Numerics {
                 operators: Operators::Conservative,
                 smoothing_ratio: 1.4,
@@ -306,7 +308,8 @@ pub(crate) mod tests {
     fn strain_is_taken_in_the_deformed_frame() {
         const STEPS: u32 = 200;
         let model = square_block(6);
-        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], Wall::NO_SLIP, None);
+        let walls = (&model.outline, Walls::statics(&model.outline));
+        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], walls, None);
         let velocity: Vec<Vec2> = model.position.iter().map(|x| Vec2::new(0.3 * x.x, 0.0)).collect();
         let mut deformation = Deformation::default();
         let strain: f64 = (0..STEPS)
@@ -319,7 +322,8 @@ pub(crate) mod tests {
     #[test]
     fn shear_has_its_spin() {
         let model = square_block(6);
-        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], Wall::NO_SLIP, None);
+        let walls = (&model.outline, Walls::statics(&model.outline));
+        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], walls, None);
         let velocity: Vec<Vec2> = model.position.iter().map(|x| Vec2::new(0.2 * x.y, 0.0)).collect();
         let rate = motion(&geometry, 30, &velocity).increment(&Deformation::default(), 1.0);
         let expected = StrainIncrement { xx: 0.0, yy: 0.0, xy: 0.2, spin: 0.1 };
@@ -337,7 +341,8 @@ pub(crate) mod tests {
         model.regions.push(Region { porosity: 0.2, ..model.regions[0].clone() });
         model.region = (0..model.nodes()).map(|node| u32::from(node >= 18)).collect();
         let phases = Phases::new(&model);
-        let geometry = Geometry::build(&model, &model.position, phases.volume(), Wall::NO_SLIP, None);
+        let walls = (&model.outline, Walls::statics(&model.outline));
+        let geometry = Geometry::build(&model, &model.position, phases.volume(), walls, None);
         let points: Vec<StressPoint> = (0..STRESS_NODES * model.nodes())
             .map(|s| StressPoint {
                 stress: Stress { xx: s as f64, yy: 2.0 * s as f64, xy: -0.5 * s as f64, zz: 0.0 },
@@ -346,7 +351,7 @@ pub(crate) mod tests {
             .collect();
         let tables = geometry.printed.as_ref().unwrap();
         let mut stress = PrintedStress::default();
-        stress.update(tables, &points, false);
+        stress.update(tables, &points);
         let i = 14;
         let own = tables.interpolation.iter_row(i).fold([0.0; 3], |sum, (s, w)| {
             let Stress { xx, yy, xy, .. } = points[s].stress;
@@ -377,10 +382,13 @@ pub(crate) mod tests {
             let wall_at_base = wall > 0;
             let mut model = disordered(&disorder, None);
             if wall_at_base {
-                model.base_elevation = -0.5;
+                model.outline = Outline::level(-0.5);
             }
-            let wall = [Wall::NO_SLIP, Wall::NO_SLIP, Wall::TRACTION, Wall::FREE_SLIP][wall as usize];
-            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], wall, None);
+            let base = [
+                Condition::NoSlip, Condition::NoSlip, Condition::VerticalRoller, Condition::FreeSlip,
+            ][wall as usize];
+            let walls = (&model.outline, Walls::shaken(&model.outline, base, [false; 2]));
+            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], walls, None);
             let velocity: Vec<Vec2> = v.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
             let points: Vec<StressPoint> = normal.iter().zip(&shear).map(|(n, s)| StressPoint {
                 stress: Stress { xx: n.0, yy: n.1, xy: s.0, zz: 0.0 },
@@ -415,7 +423,8 @@ pub(crate) mod tests {
         ) {
             let period = periodic.then_some(Period { width: COLUMNS as f64 });
             let model = disordered(&disorder, period);
-            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], Wall::NO_SLIP, None);
+            let walls = (&model.outline, Walls::statics(&model.outline));
+            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], walls, None);
             let points = vec![StressPoint { shear_modulus: 1e4, density: 1.0, volume: 0.5, ..StressPoint::default() }; STRESS_NODES * NODES];
             let rough: Vec<Vec2> = v.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
             let force = forces(&geometry, &points, &rough, 0.1);

@@ -2,8 +2,9 @@
 //! is stable. Lengths in spacings, frequencies in wave speed over spacing.
 
 use crate::{
+    boundary::Walls,
     deformation::Deformation,
-    geometry::{Geometry, Wall},
+    geometry::Geometry,
     model::{Model, Operators, STRESS_NODES, stress_node_offset},
     phases::Phases,
     skeleton::{PrintedStress, StressPoint, conservative_force, motion, tests::square_block},
@@ -30,7 +31,8 @@ impl Lattice {
         model.numerics.operators = operators;
         model.numerics.smoothing_ratio = smoothing_ratio;
         let volume = vec![1.0; model.nodes()];
-        let geometry = Geometry::build(&model, &model.position, &volume, Wall::NO_SLIP, None);
+        let walls = (&model.outline, Walls::statics(&model.outline));
+        let geometry = Geometry::build(&model, &model.position, &volume, walls, None);
         let centre = SIDE * (SIDE / 2) + SIDE / 2;
         let origin = model.position[centre];
         let stencil = |s: usize| {
@@ -142,7 +144,8 @@ fn interior_limit_of_the_time_step() {
 fn acceleration_matrix(model: &Model) -> DMatrix<f64> {
     let phases = Phases::new(model);
     let volume = phases.volume().to_vec();
-    let geometry = Geometry::build(model, &model.position, &volume, Wall::NO_SLIP, None);
+    let walls = (&model.outline, Walls::statics(&model.outline));
+    let geometry = Geometry::build(model, &model.position, &volume, walls, None);
     let nodes = model.nodes();
     let mut matrix = DMatrix::zeros(2 * nodes, 2 * nodes);
     let mut points =
@@ -163,7 +166,7 @@ fn acceleration_matrix(model: &Model) -> DMatrix<f64> {
         let still = Vec2::zeros();
         let force: Box<dyn Fn(usize) -> Vec2> = if let Some(tables) = &geometry.printed {
             let mut stress = PrintedStress::default();
-            stress.update(tables, &points, false);
+            stress.update(tables, &points);
             let (points, phases) = (&points, &phases);
             Box::new(move |j| stress.force(tables, j, points, phases))
         } else {
@@ -241,7 +244,8 @@ fn the_printed_form_has_growing_modes() {
 fn filter_matrix(model: &Model, strength: f64, shear_modulus: f64) -> DMatrix<f64> {
     let nodes = model.nodes();
     let volume = vec![1.0; nodes];
-    let geometry = Geometry::build(model, &model.position, &volume, Wall::NO_SLIP, None);
+    let walls = (&model.outline, Walls::statics(&model.outline));
+    let geometry = Geometry::build(model, &model.position, &volume, walls, None);
     let point = StressPoint { density: 1.0, volume: 0.5, shear_modulus, ..StressPoint::default() };
     let points = vec![point; STRESS_NODES * nodes];
     let mut matrix = DMatrix::zeros(2 * nodes, 2 * nodes);

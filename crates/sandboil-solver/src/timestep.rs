@@ -88,7 +88,7 @@ impl PressureSpectrum {
             .flat_map(|column| span(rows).map(move |row| (column, row)))
             .map(|(column, row)| Vec2::new(column * model.spacing.x, row * model.spacing.y))
             .filter(|offset| offset.norm() < kernel.support())
-            .map(|offset| Member { owner: 0, mirrored: false, offset, volume })
+            .map(|offset| Member { owner: 0, source: 0, mirrored: false, offset, volume })
             .collect();
         let corrected = corrected_gradient(&members, kernel).unwrap_or_default();
         let factor = laplacian_factor(&members, &corrected);

@@ -24,6 +24,8 @@ pub enum OperatorError {
 pub struct Member {
     /// Index of the real node whose value counts.
     pub owner: u32,
+    /// Index of the source: the node itself or one of its images.
+    pub source: u32,
     /// Whether the member is the mirror image of that node.
     pub mirrored: bool,
     /// `x_ji = x_j - x_i`, m.
@@ -49,6 +51,7 @@ pub fn stencil(
             let offset = pair.offset(at, sources, period);
             (offset.norm_squared() < kernel.support() * kernel.support()).then(|| Member {
                 owner: source.owner,
+                source: pair.source,
                 mirrored: source.mirrored,
                 offset,
                 volume: volume[source.owner as usize],
@@ -223,7 +226,7 @@ mod tests {
             let (column, row) = (k % 9, k / 9);
             let offset = Vec2::new(column as f64 - 4.0 + 0.1 * a, row as f64 - 4.0 + 0.1 * b);
             if offset.x >= cut.x && offset.y <= -cut.y && offset.norm() < 2.8 {
-                members.push(Member { owner: 0, mirrored: false, offset, volume: 1.0 });
+                members.push(Member { owner: 0, source: 0, mirrored: false, offset, volume: 1.0 });
             }
         }
         members
@@ -269,7 +272,13 @@ mod tests {
     #[test]
     fn a_line_of_nodes_has_no_gradient() {
         let members: Vec<Member> = (-2..=2)
-            .map(|k| Member { owner: 0, mirrored: false, offset: Vec2::new(f64::from(k), 0.0), volume: 1.0 })
+            .map(|k| Member {
+                owner: 0,
+                source: 0,
+                mirrored: false,
+                offset: Vec2::new(f64::from(k), 0.0),
+                volume: 1.0,
+            })
             .collect();
         let kernel = WendlandQuintic::new(1.4);
         assert_eq!(LeastSquaresFit::new(&members, kernel), Err(OperatorError::Degenerate));

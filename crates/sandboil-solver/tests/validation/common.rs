@@ -2,8 +2,8 @@
 
 use sandboil_soil::{Integrator, Soil, elastic::Elastic};
 use sandboil_solver::{
-    AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, SHAKING_FACTOR, Shaking, UpgoingWave,
-    Water, stress_node_offset,
+    AccelerationTerm, Base, Diffusion, Model, Numerics, Operators, Outline, Region, SHAKING_FACTOR, Shaking,
+    UpgoingWave, Water, stress_node_offset,
 };
 use sandboil_sph::{Period, Vec2};
 
@@ -48,7 +48,7 @@ pub fn column(height: f64, spacing: f64, columns: usize, region: Region, water: 
         water,
         gravity,
         period: Some(Period { width: columns as f64 * spacing }),
-        base_elevation: 0.0,
+        outline: Outline::level(0.0),
         numerics: numerics(),
     }
 }
@@ -69,8 +69,8 @@ pub fn elastic(shear_modulus: f64, bulk_modulus: f64) -> Region {
 pub fn shaking(wave: Option<UpgoingWave>, duration: f64, probes: Vec<Vec2>) -> Shaking {
     Shaking {
         duration,
-        wave,
-        half_space: None,
+        base: Base::shaken_by(wave),
+        free_field: [false; 2],
         local_damping: 0.0,
         rayleigh: None,
         time_step_factor: SHAKING_FACTOR,

@@ -4,6 +4,7 @@
 
 mod common;
 mod consolidation;
+mod free_field;
 mod rayleigh;
 mod shear_cell;
 mod stages;

@@ -6,7 +6,7 @@ use crate::{
     waves::{amplitude, damping_ratio, ricker, surface_velocity, weightless},
 };
 use nalgebra::Complex;
-use sandboil_solver::{Model, Rayleigh};
+use sandboil_solver::{HalfSpace, Model, Rayleigh};
 use std::f64::consts::PI;
 
 const SPACING: f64 = 0.2;
@@ -26,7 +26,7 @@ struct Layer {
 const SOFT: Layer = Layer { thickness: 5.0, speed: 100.0, density: 1.8 };
 const STIFF: Layer = Layer { thickness: 5.0, speed: 200.0, density: 2.0 };
 /// Shear-wave speed (m/s) and density (Mg/m3) below the layers.
-const HALF_SPACE: (f64, f64) = (300.0, 2.2);
+const HALF_SPACE: HalfSpace = HalfSpace { shear_speed: 300.0, compression_speed: None, density: 2.2 };
 
 /// A column of layers, the uppermost first.
 fn layered(layers: &[Layer]) -> Model {
@@ -67,7 +67,7 @@ fn transfer_function(layers: &[Layer], damping: Option<Rayleigh>, frequency: f64
         (velocity, stress) =
             (velocity * cos - stress / impedance * sin, stress * cos - velocity * impedance * sin);
     }
-    (velocity - stress / (HALF_SPACE.0 * HALF_SPACE.1)).norm().recip()
+    (velocity - stress / (HALF_SPACE.shear_speed * HALF_SPACE.density)).norm().recip()
 }
 
 /// Within 2 % for waves of 50 spacings and more. Shorter ones are slower on the lattice, by 2.4 % at 20 spacings, which
@@ -84,7 +84,7 @@ fn transfer_functions_of_layers() {
         for damping in [None, Some(DAMPING)] {
             let upgoing = |time: f64| ricker(PULSE, time - CENTRE);
             let (times, found) = surface_velocity(&layered(layers), upgoing, DURATION, |stage| {
-                stage.half_space = Some(HALF_SPACE);
+                stage.base.half_space = Some(HALF_SPACE);
                 stage.rayleigh = damping;
             });
             let outcrop: Vec<f64> = times.iter().map(|time| 2.0 * upgoing(*time)).collect();

@@ -5,7 +5,7 @@ use sandboil_soil::{
     Soil,
     pm4sand::{Options, PM4Sand, Parameters},
 };
-use sandboil_solver::{Gravity, Model, Operators, Rayleigh, Simulation, UpgoingWave, Water};
+use sandboil_solver::{Gravity, HalfSpace, Model, Operators, Rayleigh, Simulation, UpgoingWave, Water};
 use std::f64::consts::PI;
 
 const HEIGHT: f64 = 10.0;
@@ -80,17 +80,17 @@ fn gravity_keeps_the_geostatic_state() {
 fn a_second_shaking_stage_goes_on_where_the_first_ended() {
     const INTERVAL: f64 = 1e-3;
     const HALF: f64 = 1.0;
-    let wave = |from: f64| UpgoingWave {
-        interval: INTERVAL,
-        velocity: (0..1000).map(|k| 0.2 * (4.0 * PI * (from + f64::from(k) * INTERVAL)).sin()).collect(),
+    let wave = |from: f64| {
+        let velocity = |k: u32| 0.2 * (4.0 * PI * (from + f64::from(k) * INTERVAL)).sin();
+        UpgoingWave::shear(INTERVAL, (0..1000).map(velocity).collect())
     };
-    let whole =
-        UpgoingWave { interval: INTERVAL, velocity: [wave(0.0).velocity, wave(HALF).velocity].concat() };
+    let whole = UpgoingWave::shear(INTERVAL, [wave(0.0).horizontal, wave(HALF).horizontal].concat());
     let shaken = |stages: &[(UpgoingWave, f64)]| {
         let mut simulation = at_rest(&sand_column(Operators::Conservative));
         for (wave, duration) in stages {
             let mut stage = shaking(Some(wave.clone()), *duration, Vec::new());
-            stage.half_space = Some((200.0, 2.0));
+            stage.base.half_space =
+                Some(HalfSpace { shear_speed: 200.0, compression_speed: None, density: 2.0 });
             simulation.begin_shaking(stage).unwrap();
             assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
         }
@@ -110,7 +110,7 @@ fn a_second_shaking_stage_goes_on_where_the_first_ended() {
 fn a_bursting_sand_column_is_told_at_once() {
     let mut simulation = at_rest(&sand_column(Operators::Conservative));
     let velocity = (0..2000).map(|k| 0.5 * (0.03 * f64::from(k)).sin()).collect();
-    let mut stage = shaking(Some(UpgoingWave { interval: 1e-3, velocity }), 2.0, Vec::new());
+    let mut stage = shaking(Some(UpgoingWave::shear(1e-3, velocity)), 2.0, Vec::new());
     stage.time_step_factor = 3.0;
     simulation.begin_shaking(stage).unwrap();
     let error = simulation.advance(u64::MAX, f64::INFINITY).unwrap_err();
@@ -122,7 +122,7 @@ fn a_bursting_sand_column_is_told_at_once() {
 fn envelopes_see_every_step() {
     let mut simulation = at_rest(&sand_column(Operators::Conservative));
     let velocity = (0..500).map(|k| 0.3 * (0.02 * f64::from(k)).sin()).collect();
-    let mut stage = shaking(Some(UpgoingWave { interval: 1e-3, velocity }), 0.5, Vec::new());
+    let mut stage = shaking(Some(UpgoingWave::shear(1e-3, velocity)), 0.5, Vec::new());
     stage.pressure_envelope = true;
     stage.strain_envelope = true;
     simulation.begin_shaking(stage).unwrap();

@@ -1,7 +1,7 @@
 //! Shear waves in columns without weight: how they are driven and read.
 
 use crate::common::shaking;
-use sandboil_solver::{Model, Shaking, Simulation, UpgoingWave};
+use sandboil_solver::{HalfSpace, Model, Shaking, Simulation, UpgoingWave};
 use sandboil_sph::Vec2;
 use std::f64::consts::PI;
 
@@ -31,7 +31,7 @@ pub fn surface_velocity(
     let velocity = (0..samples).map(|k| upgoing(k as f64 * INTERVAL)).collect();
     let mut simulation = Simulation::new(model, 1).unwrap();
     let surface = Vec2::new(model.position[0].x, model.surface_elevation[0]);
-    let mut stage = shaking(Some(UpgoingWave { interval: INTERVAL, velocity }), duration, vec![surface]);
+    let mut stage = shaking(Some(UpgoingWave::shear(INTERVAL, velocity)), duration, vec![surface]);
     adjust(&mut stage);
     simulation.begin_shaking(stage).unwrap();
     assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
@@ -57,7 +57,7 @@ pub fn amplitude(times: &[f64], values: &[f64], frequency: f64) -> f64 {
 pub fn damping_ratio(model: &Model, period: f64, adjust: impl Fn(&mut Shaking)) -> f64 {
     // Resonance must stay within small strains, m/s.
     const SMALL: f64 = 1e-3;
-    const RIGID: (f64, f64) = (1e8, 2.0);
+    const RIGID: HalfSpace = HalfSpace { shear_speed: 1e8, compression_speed: None, density: 2.0 };
     const CYCLES: f64 = 5.0;
     // A smooth start and end of the drive leave the higher modes at rest: theirs would disturb the sign of v.
     let driven = 8.0 * period;
@@ -66,7 +66,7 @@ pub fn damping_ratio(model: &Model, period: f64, adjust: impl Fn(&mut Shaking)) 
         SMALL * envelope * (2.0 * PI * time / period).sin()
     };
     let (times, velocity) = surface_velocity(model, push, driven + 8.0 * period, |stage| {
-        stage.half_space = Some(RIGID);
+        stage.base.half_space = Some(RIGID);
         adjust(stage);
     });
     let cycle = |number: f64| {

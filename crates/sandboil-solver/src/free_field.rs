@@ -1,0 +1,559 @@
+//! Free-field sides (Section 4.2): beyond each side the ground goes on as a column that moves on its own, solved first and
+//! one-way. It pushes the section with its stress, and dashpots between the two let out what the section sends.
+//!
+//! The push is what the section's own force operator would feel of soil beyond the side under the column's stress: the
+//! weights of stencils completed by columns beyond the side, less those of the cut ones. A section that does as the
+//! column does is then held exactly as the column is, corners included. Velocities are not continued beyond the side:
+//! that is left to the dashpots (Eq. 15 as corrected).
+
+use crate::{
+    base::{Base, BaseSegment, Dashpot, Dashpots, trace},
+    boundary::{EdgeNodes, Hand, Outline, Side, Surroundings, Walls, id},
+    error::SolverError,
+    geometry::{Stencils, StrainRow, VectorWeight, divergence_row, stress_node_positions},
+    model::{Model, Operators, STRESS_NODES},
+    phases::Phases,
+    simulation::{Gravity, Shaking, Simulation},
+};
+use sandboil_sph::{Csr, LeastSquaresFit, NeighbourList, Period, Vec2, WendlandQuintic};
+use std::collections::BTreeMap;
+
+/// Relative difference up to which two columns' stresses are the same: they are computed, not read.
+const SAME: f64 = 1e-9;
+/// Difference of a completed and a cut weight that is round-off, over the inverse of the spacing.
+const NO_DIFFERENCE: f64 = 1e-12;
+
+/// Columns beyond the sides of a section and what ties the section to them.
+#[derive(Debug)]
+pub struct FreeField {
+    columns: Vec<Column>,
+    sides: Vec<TiedSide>,
+}
+
+/// A column one node wide, its own image on both sides.
+#[derive(Debug)]
+struct Column {
+    simulation: Simulation,
+    /// Internal index of the node of each row, from below.
+    rows: Vec<usize>,
+    velocity_before: Vec<Vec2>,
+}
+
+/// What acts on the section at one side.
+#[derive(Debug)]
+struct TiedSide {
+    hand: Hand,
+    column: usize,
+    dashpots: Dashpots,
+    tables: SideTables,
+    /// Nominal stress of the column when increments began, kPa.
+    reference: Vec<[f64; 4]>,
+    reference_pressure: Vec<f64>,
+    /// Force of the step on the nodes of the tables, kN/m.
+    force: Vec<Vec2>,
+}
+
+/// Weights of the column's stress, pressure and base traction in the force on nodes near a side.
+#[derive(Debug, Default)]
+struct SideTables {
+    nodes: Vec<usize>,
+    /// Volume times weight: rows are `nodes`, columns the column's stress nodes.
+    stress: Csr<VectorWeight>,
+    /// Volume times weight: rows are `nodes`, columns the column's nodes; empty without water.
+    pressure: Csr<Vec2>,
+    /// Length of base whose traction the cut trace misses, m.
+    base: Vec<f64>,
+}
+
+/// What the tables are built from: the section as it stands.
+pub struct Section<'a> {
+    /// Its description.
+    pub model: &'a Model,
+    /// Its edges as they stand.
+    pub outline: &'a Outline,
+    /// What they do.
+    pub walls: Walls,
+    /// Its nodes along the edges.
+    pub edges: &'a EdgeNodes,
+    /// Where the nodes are, m.
+    pub position: &'a [Vec2],
+    /// Volumes and densities.
+    pub phases: &'a Phases,
+    /// Mass of each node, Mg/m.
+    pub mass: &'a [f64],
+}
+
+impl FreeField {
+    /// Columns at rest beyond those sides of the section of which `wanted` is true, and the ties to them.
+    ///
+    /// # Errors
+    /// A column that finds no rest, or soil that refuses its stress.
+    pub fn new(
+        section: &Section,
+        wanted: [bool; 2],
+        gravity: Option<Gravity>,
+        stage: &Shaking,
+    ) -> Result<Option<Self>, SolverError> {
+        let mut free_field = Self { columns: Vec::new(), sides: Vec::new() };
+        let mut made: Vec<(Model, BaseSegment)> = Vec::new();
+        for (hand, wanted) in Hand::BOTH.into_iter().zip(wanted) {
+            let (true, Some(side)) = (wanted, section.outline.sides[hand as usize]) else { continue };
+            let model = column_model(section, hand);
+            let segment = stage.base.at(side.x);
+            let same =
+                made.iter().position(|(other, arrival)| *arrival == segment && same_column(other, &model));
+            let column = if let Some(column) = same {
+                column
+            } else {
+                free_field.columns.push(Column::at_rest(&model, gravity)?);
+                made.push((model, segment));
+                made.len() - 1
+            };
+            free_field.sides.push(TiedSide {
+                hand,
+                column,
+                dashpots: Dashpots::default(),
+                tables: SideTables::default(),
+                reference: Vec::new(),
+                reference_pressure: Vec::new(),
+                force: Vec::new(),
+            });
+        }
+        if free_field.columns.is_empty() {
+            return Ok(None);
+        }
+        free_field.begin_shaking(section, stage)?;
+        Ok(Some(free_field))
+    }
+
+    /// Begins a stage: columns are shaken by the wave that comes to their side.
+    ///
+    /// # Errors
+    /// Soil that refuses its stress.
+    pub fn begin_shaking(&mut self, section: &Section, stage: &Shaking) -> Result<(), SolverError> {
+        let mut begun = vec![false; self.columns.len()];
+        for k in 0..self.sides.len() {
+            let TiedSide { hand, column, .. } = self.sides[k];
+            let Some(side) = section.outline.sides[hand as usize] else { continue };
+            if !std::mem::replace(&mut begun[column], true) {
+                self.columns[column].simulation.begin_shaking(Shaking {
+                    base: Base {
+                        segments: vec![stage.base.at(side.x)],
+                        datum: Some(stage.base.datum.unwrap_or_else(|| section.model.outline.lowest())),
+                        ..stage.base.clone()
+                    },
+                    free_field: [false; 2],
+                    probes: Vec::new(),
+                    stress_histories: false,
+                    pressure_envelope: false,
+                    strain_envelope: false,
+                    ..stage.clone()
+                })?;
+            }
+            self.sides[k].dashpots = side_dashpots(section, (hand, side), &self.columns[column])?;
+        }
+        self.renew(section);
+        Ok(())
+    }
+
+    /// Builds columns and ties anew where nodes now are; pushes count from here.
+    pub fn renew(&mut self, section: &Section) {
+        for side in &mut self.sides {
+            let column = &self.columns[side.column];
+            side.tables = SideTables::new(section, side.hand, column);
+            side.force = vec![Vec2::zeros(); side.tables.nodes.len()];
+            side.reference = column.nominal_stress();
+            side.reference_pressure = column.simulation.excess().to_vec();
+        }
+    }
+
+    /// Gives the columns the excess pressure of the section beside them, kPa, held in balance.
+    pub fn set_excess(&mut self, edges: &EdgeNodes, excess: &[f64]) {
+        for side in &mut self.sides {
+            let column = &mut self.columns[side.column];
+            for (&node, &row) in edges.sides[side.hand as usize].iter().zip(&column.rows) {
+                column.simulation.set_excess_at(row, excess[node]);
+            }
+            column.simulation.store_reaction();
+            side.reference_pressure = column.simulation.excess().to_vec();
+        }
+    }
+
+    /// Adds the pushes of the last step to forces on all nodes, kN/m.
+    pub fn add_force(&self, force: &mut [Vec2]) {
+        for side in &self.sides {
+            for (&node, pushed) in side.tables.nodes.iter().zip(&side.force) {
+                force[node] += pushed;
+            }
+        }
+    }
+
+    /// The columns.
+    pub fn columns(&self) -> impl Iterator<Item = &Simulation> {
+        self.columns.iter().map(|column| &column.simulation)
+    }
+
+    /// Renews the geometry of every column.
+    pub fn renew_columns(&mut self) {
+        for column in &mut self.columns {
+            column.simulation.renew_geometry(None);
+        }
+    }
+
+    /// The first half of a step: columns advance by `dt` (s), and the section's trace is remembered.
+    ///
+    /// # Errors
+    /// A column that has diverged.
+    pub fn begin_step(&mut self, dt: f64, velocity: &[Vec2]) -> Result<(), SolverError> {
+        for side in &mut self.sides {
+            let column = &self.columns[side.column];
+            side.push(column);
+            side.dashpots.begin_step(velocity);
+        }
+        for column in &mut self.columns {
+            column.velocity_before.clear();
+            column.velocity_before.extend(column.rows.iter().map(|&row| column.simulation.velocity_of(row)));
+            column.simulation.column_step(dt)?;
+        }
+        for side in &mut self.sides {
+            let traction = self.columns[side.column].simulation.base_traction();
+            for (force, length) in side.force.iter_mut().zip(&side.tables.base) {
+                *force += traction * *length;
+            }
+        }
+        Ok(())
+    }
+
+    /// The pushes of the step, on velocities that the section's own forces have moved already.
+    pub fn push(&self, dt: f64, mass: &[f64], velocity: &mut [Vec2], acceleration: &mut [Vec2]) {
+        for side in &self.sides {
+            for (&node, force) in side.tables.nodes.iter().zip(&side.force) {
+                let pushed = force / mass[node];
+                velocity[node] += pushed * dt;
+                acceleration[node] += pushed;
+            }
+        }
+    }
+
+    /// The dashpots of the step: they pull towards the columns' motion.
+    pub fn end_step(&mut self, dt: f64, mass: &[f64], velocity: &mut [Vec2], acceleration: &mut [Vec2]) {
+        for side in &mut self.sides {
+            let column = &self.columns[side.column];
+            let target = |dashpot: &Dashpot| {
+                let now = column.simulation.velocity_of(column.rows[dashpot.point]);
+                (0.5 * (now + column.velocity_before[dashpot.point])).dot(&dashpot.direction)
+            };
+            let targets: Vec<f64> = side.dashpots.all().iter().map(target).collect();
+            side.dashpots.end_step(dt, mass, (velocity, acceleration), |k| targets[k]);
+        }
+    }
+
+    /// Bytes held, columns included.
+    pub fn bytes(&self) -> usize {
+        let column =
+            |column: &Column| column.simulation.arrays().iter().map(|(_, bytes)| bytes).sum::<usize>();
+        let side = |side: &TiedSide| {
+            side.dashpots.bytes()
+                + side.tables.stress.bytes()
+                + side.tables.pressure.bytes()
+                + size_of_val(side.reference.as_slice())
+                + size_of_val(side.reference_pressure.as_slice())
+                + 2 * size_of_val(side.force.as_slice())
+        };
+        self.columns.iter().map(column).sum::<usize>() + self.sides.iter().map(side).sum::<usize>()
+    }
+}
+
+impl Column {
+    fn at_rest(model: &Model, gravity: Option<Gravity>) -> Result<Self, SolverError> {
+        let mut simulation = Simulation::new(model, 1)?;
+        if let Some(gravity) = gravity {
+            simulation.begin_gravity(gravity)?;
+            simulation.advance(u64::MAX, f64::INFINITY)?;
+        }
+        let rows = simulation.internal_order();
+        Ok(Self { simulation, rows, velocity_before: Vec::new() })
+    }
+
+    /// Nominal stress `[xx, xy, yx, yy]` of the column's stress nodes, kPa.
+    fn nominal_stress(&self) -> Vec<[f64; 4]> {
+        self.simulation.stress_points().iter().map(|p| p.deformation.cofactor().nominal(&p.stress)).collect()
+    }
+}
+
+impl TiedSide {
+    /// Force of the increments of the column's stress and pressure on the section (Eq. 6 beyond the side).
+    fn push(&mut self, column: &Column) {
+        let now = column.simulation.stress_points();
+        let excess = column.simulation.excess();
+        for (row, force) in self.force.iter_mut().enumerate() {
+            *force = Vec2::zeros();
+            for (s, weight) in self.tables.stress.iter_row(row) {
+                let nominal = now[s].deformation.cofactor().nominal(&now[s].stress);
+                let reference = &self.reference[s];
+                *force -= weight.contract([0, 1, 2, 3].map(|c| nominal[c] - reference[c]));
+            }
+            for (i, weight) in self.tables.pressure.iter_row(row) {
+                let carried = column.simulation.carried_by_water(i, *weight);
+                *force += carried * (excess[i] - self.reference_pressure[i]);
+            }
+        }
+    }
+}
+
+/// The soil at a side as a column between periodic sides.
+fn column_model(section: &Section, hand: Hand) -> Model {
+    let Section { model, outline, edges, .. } = section;
+    let nodes = &edges.sides[hand as usize];
+    // The column starts where the section did: its rest is found on the undeformed lattice.
+    let x = nodes.first().map_or(0.0, |&node| model.position[node].x);
+    let pick = |values: &[f64]| nodes.iter().filter_map(|&node| values.get(node).copied()).collect();
+    let middle = 0.5 * model.spacing.x;
+    Model {
+        position: nodes.iter().map(|&node| Vec2::new(middle, model.position[node].y)).collect(),
+        region: nodes.iter().map(|&node| model.region[node]).collect(),
+        surface_elevation: pick(&model.surface_elevation),
+        vertical_effective_stress: nodes
+            .iter()
+            .flat_map(|&node| [0, 1].map(|k| model.vertical_effective_stress[STRESS_NODES * node + k]))
+            .collect(),
+        pore_pressure: pick(&model.pore_pressure),
+        period: Some(Period { width: model.spacing.x }),
+        outline: Outline {
+            base_support: outline.base_support,
+            ..Outline::level(model.outline.base_elevation(x))
+        },
+        ..(*model).clone()
+    }
+}
+
+/// Whether two columns are made of the same rows.
+fn same_column(a: &Model, b: &Model) -> bool {
+    let close = |a: &[f64], b: &[f64]| {
+        a.len() == b.len()
+            && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME * a.abs().max(b.abs()).max(1.0))
+    };
+    let heights = |model: &Model| model.position.iter().map(|x| x.y).collect::<Vec<_>>();
+    a.region == b.region
+        && close(&heights(a), &heights(b))
+        && close(&a.vertical_effective_stress, &b.vertical_effective_stress)
+        && close(&a.pore_pressure, &b.pore_pressure)
+        && close(&a.surface_elevation, &b.surface_elevation)
+        && close(&[a.outline.base_elevation(0.0)], &[b.outline.base_elevation(0.0)])
+}
+
+/// A dashpot across and one along the side for each of its rows, of the column's small-strain speeds.
+fn side_dashpots(
+    section: &Section,
+    (hand, side): (Hand, Side),
+    column: &Column,
+) -> Result<Dashpots, SolverError> {
+    let nodes = &section.edges.sides[hand as usize];
+    let points: Vec<Vec2> = nodes.iter().map(|&node| Vec2::new(side.x, section.position[node].y)).collect();
+    let mut all = Vec::with_capacity(2 * nodes.len());
+    for (point, &row) in column.rows.iter().enumerate() {
+        let below = column.simulation.small_strain_impedance(row)?;
+        let (eta_s, eta_p) = (below.density * below.shear_speed, below.density * below.compression_speed);
+        for (direction, impedance) in [(Vec2::x(), eta_p), (Vec2::y(), eta_s)] {
+            all.push(Dashpot { point, direction, impedance, length: section.model.spacing.y });
+        }
+    }
+    Ok(Dashpots::new(all, trace(section.model, section.position, &points, nodes), section.mass))
+}
+
+impl SideTables {
+    fn new(section: &Section, hand: Hand, column: &Column) -> Self {
+        match section.model.numerics.operators {
+            Operators::Conservative => Self::completed(section, hand, column),
+            Operators::Printed => Self::on_outermost_row(section, hand, column),
+        }
+    }
+
+    /// The column's traction on the outermost node of each row.
+    fn on_outermost_row(section: &Section, hand: Hand, column: &Column) -> Self {
+        let nodes = section.edges.sides[hand as usize].clone();
+        let outward = hand.normal() * section.model.spacing.y;
+        let (mut stress, mut pressure) =
+            (Csr::with_capacity(nodes.len(), 0), Csr::with_capacity(nodes.len(), 0));
+        for &row in &column.rows {
+            let share = VectorWeight::plain(-outward / STRESS_NODES as f64);
+            stress.push_row(&mut [0, 1].map(|k| (id(STRESS_NODES * row + k), share)));
+            let wet = section.model.water.is_some();
+            pressure.push_row(&mut if wet { vec![(id(row), -outward)] } else { Vec::new() });
+        }
+        Self { base: vec![0.0; nodes.len()], stress, pressure, nodes }
+    }
+
+    /// Weights of stencils completed by the column beyond the side, less those of the cut ones.
+    fn completed(section: &Section, hand: Hand, column: &Column) -> Self {
+        let model = section.model;
+        let strip = Strip::new(section, hand);
+        let cut = strip.around(section, section.outline, strip.local.len());
+        let without_side = Outline { sides: [None, None], ..section.outline.clone() };
+        let whole = strip.around(section, &without_side, strip.position.len());
+        let kernel = WendlandQuintic::new(model.smoothing_length());
+        let list = |queries: &[Vec2], around: &Surroundings| {
+            NeighbourList::build(queries, &around.sources, kernel.support(), 0.0, None)
+        };
+        let stencils = |around| Stencils { around, volume: &strip.volume, kernel, period: None };
+        let (cut_stencils, whole_stencils) = (stencils(&cut), stencils(&whole));
+        let negligible = NO_DIFFERENCE / model.mean_spacing();
+
+        let mut stress: Vec<Vec<(u32, VectorWeight)>> = vec![Vec::new(); strip.local.len()];
+        let stress_position = stress_node_positions(&strip.position, model.spacing);
+        let (in_cut, in_whole) = (list(&stress_position, &cut), list(&stress_position, &whole));
+        for (s, &at) in stress_position.iter().enumerate() {
+            let (node, k) = (s / STRESS_NODES, s % STRESS_NODES);
+            let Some(row) = strip.row[node] else { continue };
+            let mut weights: BTreeMap<u32, VectorWeight> = BTreeMap::new();
+            let mut take = |stencils: &Stencils, list: &NeighbourList, sign: f64| {
+                let Some(found) = StrainRow::least_squares(stencils, &stencils.all(list, s, at)) else {
+                    return;
+                };
+                let free = found.free.iter().map(|(owner, g)| (*owner, VectorWeight::plain(g.gradient)));
+                for (owner, mut weight) in free.chain(found.walls) {
+                    weight *= sign;
+                    *weights.entry(owner).or_default() += weight;
+                }
+            };
+            take(&whole_stencils, &in_whole, 1.0);
+            if node < strip.local.len() {
+                take(&cut_stencils, &in_cut, -1.0);
+            }
+            for (owner, mut weight) in weights {
+                if (owner as usize) < strip.local.len() && weight.magnitude() > negligible {
+                    weight *= strip.volume[node] / STRESS_NODES as f64;
+                    stress[owner as usize].push((id(STRESS_NODES * column.rows[row] + k), weight));
+                }
+            }
+        }
+
+        let mut pressure: Vec<Vec<(u32, Vec2)>> = vec![Vec::new(); strip.local.len()];
+        if model.water.is_some() {
+            let (in_cut, in_whole) = (list(&strip.position, &cut), list(&strip.position, &whole));
+            for (node, &at) in strip.position.iter().enumerate() {
+                let Some(row) = strip.row[node] else { continue };
+                let mut weights: BTreeMap<u32, Vec2> = BTreeMap::new();
+                let mut take = |stencils: &Stencils, list: &NeighbourList, sign: f64| {
+                    for (owner, weight) in divergence_row(stencils, &stencils.all(list, node, at), id(node)) {
+                        *weights.entry(owner).or_default() += weight * sign;
+                    }
+                };
+                take(&whole_stencils, &in_whole, 1.0);
+                if node < strip.local.len() {
+                    take(&cut_stencils, &in_cut, -1.0);
+                }
+                for (owner, weight) in weights {
+                    if (owner as usize) < strip.local.len() && weight.norm() > negligible {
+                        pressure[owner as usize].push((id(column.rows[row]), weight * strip.volume[node]));
+                    }
+                }
+            }
+        }
+
+        let base = strip.base_lengths(section, hand, kernel);
+        let mut tables = Self::default();
+        for (local, &node) in strip.local.iter().enumerate() {
+            if stress[local].is_empty() && pressure[local].is_empty() && base[local] == 0.0 {
+                continue;
+            }
+            tables.nodes.push(node);
+            tables.stress.push_row(&mut stress[local]);
+            tables.pressure.push_row(&mut pressure[local]);
+            tables.base.push(base[local]);
+        }
+        tables
+    }
+}
+
+/// The nodes near a side, and beyond it the column again and again, as far as stencils reach.
+struct Strip {
+    /// Nodes of the section near the side.
+    local: Vec<usize>,
+    /// Their positions, then those of the repeated column, m.
+    position: Vec<Vec2>,
+    volume: Vec<f64>,
+    /// Row of the column at the height of each; none beside a slope that stands higher.
+    row: Vec<Option<usize>>,
+}
+
+impl Strip {
+    fn new(section: &Section, hand: Hand) -> Self {
+        let Section { model, edges, position, phases, .. } = section;
+        let reach = 2.0 * WendlandQuintic::new(model.smoothing_length()).support();
+        let side = &edges.sides[hand as usize];
+        let outer =
+            side.iter().map(|&node| position[node].dot(&hand.normal())).fold(f64::NEG_INFINITY, f64::max);
+        let local: Vec<usize> = (0..position.len())
+            .filter(|&node| outer - position[node].dot(&hand.normal()) < reach + model.spacing.x)
+            .collect();
+        let first = side.first().map_or(0.0, |&node| model.position[node].y);
+        let row_of = |node: usize| {
+            let row = ((model.position[node].y - first) / model.spacing.y).round();
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked to be a row
+            (row >= 0.0 && row < side.len() as f64).then_some(row as usize)
+        };
+        let mut strip = Self {
+            position: local.iter().map(|&node| position[node]).collect(),
+            volume: local.iter().map(|&node| phases.volume()[node]).collect(),
+            row: local.iter().map(|&node| row_of(node)).collect(),
+            local,
+        };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a handful of columns
+        let repeats = (reach / model.spacing.x).ceil() as usize + 1;
+        for repeat in 1..=repeats {
+            for (row, &node) in side.iter().enumerate() {
+                strip.position.push(position[node] + hand.normal() * (repeat as f64 * model.spacing.x));
+                strip.volume.push(phases.volume()[node]);
+                strip.row.push(Some(row));
+            }
+        }
+        strip
+    }
+
+    /// The first `count` nodes and their images.
+    fn around(&self, section: &Section, outline: &Outline, count: usize) -> Surroundings {
+        let reach = WendlandQuintic::new(section.model.smoothing_length()).support();
+        Surroundings::new(&self.position[..count], outline, section.walls, reach)
+    }
+
+    /// Length of base, m, whose traction acts on each node of the strip through a completed trace, less that of the cut
+    /// one.
+    fn base_lengths(&self, section: &Section, hand: Hand, kernel: WendlandQuintic) -> Vec<f64> {
+        let mut lengths = vec![0.0; self.local.len()];
+        let Some(&corner) = section.edges.sides[hand as usize].first() else { return lengths };
+        let on_base = |node: usize| section.edges.base.contains(&node);
+        if !on_base(corner) || section.model.outline.base.is_empty() {
+            return lengths;
+        }
+        let (model, outline) = (section.model, section.outline);
+        let side_rows = section.edges.sides[hand as usize].len();
+        let lowest = self.local.iter().enumerate().filter(|(_, node)| on_base(**node)).map(|(k, _)| k);
+        let beyond = (self.local.len()..self.position.len()).step_by(side_rows.max(1));
+        let columns: Vec<usize> = lowest.chain(beyond).collect();
+        let points: Vec<Vec2> = columns
+            .iter()
+            .map(|&k| Vec2::new(self.position[k].x, outline.base_elevation(self.position[k].x)))
+            .collect();
+        for (count, sign) in [(self.position.len(), 1.0), (self.local.len(), -1.0)] {
+            let around = Surroundings::bare(&self.position[..count]);
+            let list = NeighbourList::build(&points, &around.sources, kernel.support(), 0.0, None);
+            let stencils = Stencils { around: &around, volume: &self.volume, kernel, period: None };
+            for (k, (&column, &at)) in columns.iter().zip(&points).enumerate() {
+                if column >= count {
+                    continue;
+                }
+                let members = stencils.all(&list, k, at);
+                let Ok(fit) = LeastSquaresFit::new(&members, kernel) else { continue };
+                let length = sign * model.spacing.x / -outline.base_normal(at.x).y;
+                for (k, member) in members.iter().enumerate() {
+                    if let Some(sum) = lengths.get_mut(member.owner as usize) {
+                        *sum += length * fit.value_weight(k, member);
+                    }
+                }
+            }
+        }
+        let round_off = NO_DIFFERENCE * model.mean_spacing();
+        lengths.iter().map(|length| if length.abs() > round_off { *length } else { 0.0 }).collect()
+    }
+}

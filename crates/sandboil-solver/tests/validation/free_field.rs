@@ -1,0 +1,80 @@
+//! Free-field sides: they hold still, move the section as the column moves, and let waves out.
+
+use crate::{
+    common::{column, elastic, shaking},
+    waves::ricker,
+};
+use sandboil_solver::{Gravity, Model, Region, Shaking, Side, Simulation, Support, UpgoingWave, Water};
+
+const HEIGHT: f64 = 10.0;
+const SPACING: f64 = 0.2;
+const COLUMNS: usize = 25;
+const WATER: Water = Water { unit_weight: 10.0, bulk_modulus: 1e6 };
+const GRAVITY_STAGE: Gravity = Gravity { tolerance: 1e-5, max_steps: 20_000 };
+/// Wave speed 100 m/s at 2 Mg/m3.
+const SHEAR_MODULUS: f64 = 2e4;
+
+/// A column's soil between two sides, rollers in statics.
+fn block(height: f64, spacing: f64, columns: usize, region: Region, water: Option<Water>) -> Model {
+    let mut model = column(height, spacing, columns, region, water);
+    let side = |x: f64| Some(Side { x, extent: [0.0, height], support: Support::FreeSlip });
+    model.outline.sides = [side(0.0), side(columns as f64 * spacing)];
+    model.period = None;
+    model
+}
+
+fn at_rest(model: &Model) -> Simulation {
+    let mut simulation = Simulation::new(model, 1).unwrap();
+    simulation.begin_gravity(GRAVITY_STAGE).unwrap();
+    assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
+    simulation
+}
+
+fn pulse(frequency: f64, amplitude: f64) -> UpgoingWave {
+    let velocity =
+        (0..1000).map(|k| amplitude * ricker(frequency, f64::from(k) * 1e-3 - 1.5 / frequency)).collect();
+    UpgoingWave::shear(1e-3, velocity)
+}
+
+fn on_free_field(stage: Shaking) -> Shaking {
+    Shaking { free_field: [true, true], ..stage }
+}
+
+/// A block between free-field sides moves as its column does, everywhere and at every time.
+#[test]
+fn a_block_follows_its_column() {
+    for (what, water, conductivity) in
+        [("dry", None, 0.0), ("undrained", Some(WATER), 0.0), ("draining", Some(WATER), 1e-3)]
+    {
+        let mut region = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
+        region.hydraulic_conductivity = conductivity;
+        let mut wide = at_rest(&block(HEIGHT, SPACING, COLUMNS, region.clone(), water));
+        let mut narrow = at_rest(&column(HEIGHT, SPACING, 1, region, water));
+        let stage = shaking(Some(pulse(5.0, 0.1)), 0.8, Vec::new());
+        wide.begin_shaking(on_free_field(stage.clone())).unwrap();
+        narrow.begin_shaking(stage).unwrap();
+        assert_eq!(wide.time_step().0, narrow.time_step().0);
+        let (mut peak, mut apart) = (0.0_f64, vec![0.0_f64; wide.nodes()]);
+        while !wide.is_complete() {
+            wide.advance(1, f64::INFINITY).unwrap();
+            narrow.advance(1, f64::INFINITY).unwrap();
+            let (v, reference) = (wide.velocity(), narrow.velocity());
+            for (k, v) in v.iter().enumerate() {
+                let reference = reference[k / COLUMNS];
+                peak = peak.max(reference[0].abs());
+                apart[k] = apart[k].max((v[0] - reference[0]).hypot(v[1] - reference[1]));
+            }
+        }
+        let at = |row: usize, column: usize| 100.0 * apart[row * COLUMNS + column] / peak;
+        let worst = apart.iter().copied().fold(0.0, f64::max) / peak;
+        println!(
+            "{what}: peak {peak:.3} m/s, worst {:.3} %; corners {:.3} and {:.3} %, side {:.3} %, centre {:.3} %",
+            100.0 * worst,
+            at(0, 0),
+            at(49, 0),
+            at(25, 0),
+            at(25, 12)
+        );
+        assert!(worst < 0.025, "{worst}");
+    }
+}
