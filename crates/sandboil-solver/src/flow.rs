@@ -185,7 +185,11 @@ impl Flow {
                         if let Some(density) = acceleration_term {
                             let carried: f64 = divergence
                                 .iter_row(node)
-                                .map(|(j, weight)| weight.dot(&acceleration[j]) * conductivity[j])
+                                .map(|(j, weight)| {
+                                    // Beyond a free-field side the soil is the node's own.
+                                    let conductivity = conductivity.get(j).unwrap_or(&conductivity[node]);
+                                    weight.dot(&acceleration[j]) * conductivity
+                                })
                                 .sum();
                             rate += carried * density;
                         }

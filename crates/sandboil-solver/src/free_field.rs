@@ -2,15 +2,16 @@
 //! one-way. It pushes the section with its stress, and dashpots between the two let out what the section sends.
 //!
 //! The push is what the section's own force operator would feel of soil beyond the side under the column's stress: the
-//! weights of stencils completed by columns beyond the side, less those of the cut ones. A section that does as the
-//! column does is then held exactly as the column is, corners included. Velocities are not continued beyond the side:
-//! that is left to the dashpots (Eq. 15 as corrected).
+//! weights of stencils completed by columns beyond the side, less those of the cut ones. Strain is treated alike: the cut
+//! stencils see the difference to the column's motion, the completed ones the column's. A section that does as the column
+//! does is then held exactly as the column is, corners included, and neither coupling answers to what the section does
+//! otherwise: that is left to the dashpots (Eq. 15 as corrected).
 
 use crate::{
     base::{Base, BaseSegment, Dashpot, Dashpots, trace},
     boundary::{EdgeNodes, Hand, Outline, Side, Surroundings, Walls, id},
     error::SolverError,
-    geometry::{Stencils, StrainRow, VectorWeight, divergence_row, stress_node_positions},
+    geometry::{Geometry, Stencils, StrainRow, VectorWeight, divergence_row, stress_node_positions},
     model::{Model, Operators, STRESS_NODES},
     phases::Phases,
     simulation::{Gravity, Shaking, Simulation},
@@ -45,6 +46,8 @@ struct TiedSide {
     hand: Hand,
     column: usize,
     dashpots: Dashpots,
+    /// Weights of the column's rows in the motion that the dashpots' points would have with it.
+    trace: Csr<f64>,
     tables: SideTables,
     /// Nominal stress of the column when increments began, kPa.
     reference: Vec<[f64; 4]>,
@@ -63,6 +66,11 @@ struct SideTables {
     pressure: Csr<Vec2>,
     /// Length of base whose traction the cut trace misses, m.
     base: Vec<f64>,
+    /// Weights of the column's velocities in the section's strain, for each stress node near the side; columns are rows
+    /// of the column.
+    strain: BTreeMap<usize, Vec<(u32, VectorWeight)>>,
+    /// The same in the divergence at nodes.
+    divergence: BTreeMap<usize, Vec<(u32, Vec2)>>,
 }
 
 /// What the tables are built from: the section as it stands.
@@ -113,6 +121,7 @@ impl FreeField {
                 hand,
                 column,
                 dashpots: Dashpots::default(),
+                trace: Csr::default(),
                 tables: SideTables::default(),
                 reference: Vec::new(),
                 reference_pressure: Vec::new(),
@@ -150,7 +159,8 @@ impl FreeField {
                     ..stage.clone()
                 })?;
             }
-            self.sides[k].dashpots = side_dashpots(section, (hand, side), &self.columns[column])?;
+            (self.sides[k].dashpots, self.sides[k].trace) =
+                side_dashpots(section, (hand, side), &self.columns[column])?;
         }
         self.renew(section);
         Ok(())
@@ -176,6 +186,38 @@ impl FreeField {
             }
             column.simulation.store_reaction();
             side.reference_pressure = column.simulation.excess().to_vec();
+        }
+    }
+
+    /// Number of velocities that columns lend to the section.
+    pub fn guests(&self) -> usize {
+        self.sides.iter().map(|side| self.columns[side.column].rows.len()).sum()
+    }
+
+    /// Lets the section's strain see the velocities lent, which stand from index `nodes` on.
+    pub fn tie(&self, geometry: &mut Geometry, nodes: usize) {
+        let mut first = id(nodes);
+        for side in &self.sides {
+            let shifted = |row: u32| first + row;
+            geometry.see_guests(
+                renumbered(&side.tables.strain, shifted),
+                renumbered(&side.tables.divergence, shifted),
+            );
+            first += id(self.columns[side.column].rows.len());
+        }
+    }
+
+    /// Copies the columns' motion to where the section sees it.
+    pub fn lend(&self, velocity: &mut [Vec2], acceleration: &mut [Vec2]) {
+        let lent = self.sides.iter().flat_map(|side| {
+            let column = &self.columns[side.column];
+            column
+                .rows
+                .iter()
+                .map(|&row| (column.simulation.velocity_of(row), column.simulation.acceleration_of(row)))
+        });
+        for ((v, a), (lent_v, lent_a)) in velocity.iter_mut().zip(acceleration).zip(lent) {
+            (*v, *a) = (lent_v, lent_a);
         }
     }
 
@@ -239,9 +281,13 @@ impl FreeField {
     pub fn end_step(&mut self, dt: f64, mass: &[f64], velocity: &mut [Vec2], acceleration: &mut [Vec2]) {
         for side in &mut self.sides {
             let column = &self.columns[side.column];
+            // The column's motion as the section's own trace would read it.
             let target = |dashpot: &Dashpot| {
-                let now = column.simulation.velocity_of(column.rows[dashpot.point]);
-                (0.5 * (now + column.velocity_before[dashpot.point])).dot(&dashpot.direction)
+                let read = |(row, weight): (usize, &f64)| {
+                    let now = column.simulation.velocity_of(column.rows[row]);
+                    weight * (now + column.velocity_before[row]).dot(&dashpot.direction)
+                };
+                0.5 * side.trace.iter_row(dashpot.point).map(read).sum::<f64>()
             };
             let targets: Vec<f64> = side.dashpots.all().iter().map(target).collect();
             side.dashpots.end_step(dt, mass, (velocity, acceleration), |k| targets[k]);
@@ -262,6 +308,15 @@ impl FreeField {
         };
         self.columns.iter().map(column).sum::<usize>() + self.sides.iter().map(side).sum::<usize>()
     }
+}
+
+fn renumbered<T: Copy>(
+    rows: &BTreeMap<usize, Vec<(u32, T)>>,
+    number: impl Fn(u32) -> u32,
+) -> BTreeMap<usize, Vec<(u32, T)>> {
+    let renumber =
+        |entries: &Vec<(u32, T)>| entries.iter().map(|&(column, weight)| (number(column), weight)).collect();
+    rows.iter().map(|(&row, entries)| (row, renumber(entries))).collect()
 }
 
 impl Column {
@@ -342,23 +397,65 @@ fn same_column(a: &Model, b: &Model) -> bool {
         && close(&[a.outline.base_elevation(0.0)], &[b.outline.base_elevation(0.0)])
 }
 
-/// A dashpot across and one along the side for each of its rows, of the column's small-strain speeds.
+/// A dashpot across and one along the side for each of its rows, of the column's small-strain speeds, and the trace at
+/// their points over the rows of the column.
 fn side_dashpots(
     section: &Section,
     (hand, side): (Hand, Side),
     column: &Column,
-) -> Result<Dashpots, SolverError> {
-    let nodes = &section.edges.sides[hand as usize];
-    let points: Vec<Vec2> = nodes.iter().map(|&node| Vec2::new(side.x, section.position[node].y)).collect();
+) -> Result<(Dashpots, Csr<f64>), SolverError> {
+    let Section { model, position, edges, .. } = section;
+    let nodes = &edges.sides[hand as usize];
+    let points: Vec<Vec2> = nodes.iter().map(|&node| Vec2::new(side.x, position[node].y)).collect();
     let mut all = Vec::with_capacity(2 * nodes.len());
     for (point, &row) in column.rows.iter().enumerate() {
         let below = column.simulation.small_strain_impedance(row)?;
         let (eta_s, eta_p) = (below.density * below.shear_speed, below.density * below.compression_speed);
         for (direction, impedance) in [(Vec2::x(), eta_p), (Vec2::y(), eta_s)] {
-            all.push(Dashpot { point, direction, impedance, length: section.model.spacing.y });
+            all.push(Dashpot { point, direction, impedance, length: model.spacing.y });
         }
     }
-    Ok(Dashpots::new(all, trace(section.model, section.position, &points, nodes), section.mass))
+    let trace = trace(model, position, &points, nodes);
+    let rows = Rows::of(section, hand);
+    let mut over_rows = Csr::with_capacity(trace.rows(), trace.entries());
+    for point in 0..trace.rows() {
+        let row =
+            trace.iter_row(point).map(|(node, &weight)| (id(rows.nearest(model.position[node].y)), weight));
+        over_rows.push_row(&mut row.collect::<Vec<_>>());
+    }
+    Ok((Dashpots::new(all, trace, section.mass), over_rows))
+}
+
+/// Rows of the column at a side, by their elevation on the undeformed lattice.
+struct Rows {
+    lowest: f64,
+    spacing: f64,
+    last: usize,
+}
+
+impl Rows {
+    fn of(section: &Section, hand: Hand) -> Self {
+        let side = &section.edges.sides[hand as usize];
+        let lowest = side.first().map_or(0.0, |&node| section.model.position[node].y);
+        Self { lowest, spacing: section.model.spacing.y, last: side.len().saturating_sub(1) }
+    }
+
+    fn height(&self, y: f64) -> f64 {
+        ((y - self.lowest) / self.spacing).round()
+    }
+
+    /// The row at an elevation, or the column's end for what stands higher or lower.
+    fn nearest(&self, y: f64) -> usize {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to the rows
+        let row = self.height(y).clamp(0.0, self.last as f64) as usize;
+        row
+    }
+
+    /// The row at an elevation, if the column has one.
+    fn at(&self, y: f64) -> Option<usize> {
+        let row = self.nearest(y);
+        (self.height(y) == row as f64).then_some(row)
+    }
 }
 
 impl SideTables {
@@ -381,7 +478,7 @@ impl SideTables {
             let wet = section.model.water.is_some();
             pressure.push_row(&mut if wet { vec![(id(row), -outward)] } else { Vec::new() });
         }
-        Self { base: vec![0.0; nodes.len()], stress, pressure, nodes }
+        Self { base: vec![0.0; nodes.len()], stress, pressure, nodes, ..Self::default() }
     }
 
     /// Weights of stencils completed by the column beyond the side, less those of the cut ones.
@@ -399,12 +496,12 @@ impl SideTables {
         let (cut_stencils, whole_stencils) = (stencils(&cut), stencils(&whole));
         let negligible = NO_DIFFERENCE / model.mean_spacing();
 
+        let mut tables = Self::default();
         let mut stress: Vec<Vec<(u32, VectorWeight)>> = vec![Vec::new(); strip.local.len()];
         let stress_position = stress_node_positions(&strip.position, model.spacing);
         let (in_cut, in_whole) = (list(&stress_position, &cut), list(&stress_position, &whole));
         for (s, &at) in stress_position.iter().enumerate() {
             let (node, k) = (s / STRESS_NODES, s % STRESS_NODES);
-            let Some(row) = strip.row[node] else { continue };
             let mut weights: BTreeMap<u32, VectorWeight> = BTreeMap::new();
             let mut take = |stencils: &Stencils, list: &NeighbourList, sign: f64| {
                 let Some(found) = StrainRow::least_squares(stencils, &stencils.all(list, s, at)) else {
@@ -420,6 +517,14 @@ impl SideTables {
             if node < strip.local.len() {
                 take(&cut_stencils, &in_cut, -1.0);
             }
+            // Seen from here the column's soil stands on both sides: nodes of its rows move as it does.
+            let near = weights.values().any(|weight| weight.magnitude() > negligible);
+            if node < strip.local.len() && near {
+                let rows =
+                    weights.iter().map(|(&owner, &weight)| (id(strip.row_or_end[owner as usize]), weight));
+                tables.strain.insert(STRESS_NODES * strip.local[node] + k, rows.collect());
+            }
+            let Some(row) = strip.row[node] else { continue };
             for (owner, mut weight) in weights {
                 if (owner as usize) < strip.local.len() && weight.magnitude() > negligible {
                     weight *= strip.volume[node] / STRESS_NODES as f64;
@@ -432,7 +537,6 @@ impl SideTables {
         if model.water.is_some() {
             let (in_cut, in_whole) = (list(&strip.position, &cut), list(&strip.position, &whole));
             for (node, &at) in strip.position.iter().enumerate() {
-                let Some(row) = strip.row[node] else { continue };
                 let mut weights: BTreeMap<u32, Vec2> = BTreeMap::new();
                 let mut take = |stencils: &Stencils, list: &NeighbourList, sign: f64| {
                     for (owner, weight) in divergence_row(stencils, &stencils.all(list, node, at), id(node)) {
@@ -443,6 +547,14 @@ impl SideTables {
                 if node < strip.local.len() {
                     take(&cut_stencils, &in_cut, -1.0);
                 }
+                let near = weights.values().any(|weight| weight.norm() > negligible);
+                if node < strip.local.len() && near {
+                    let rows = weights
+                        .iter()
+                        .map(|(&owner, &weight)| (id(strip.row_or_end[owner as usize]), weight));
+                    tables.divergence.insert(strip.local[node], rows.collect());
+                }
+                let Some(row) = strip.row[node] else { continue };
                 for (owner, weight) in weights {
                     if (owner as usize) < strip.local.len() && weight.norm() > negligible {
                         pressure[owner as usize].push((id(column.rows[row]), weight * strip.volume[node]));
@@ -452,7 +564,6 @@ impl SideTables {
         }
 
         let base = strip.base_lengths(section, hand, kernel);
-        let mut tables = Self::default();
         for (local, &node) in strip.local.iter().enumerate() {
             if stress[local].is_empty() && pressure[local].is_empty() && base[local] == 0.0 {
                 continue;
@@ -475,6 +586,8 @@ struct Strip {
     volume: Vec<f64>,
     /// Row of the column at the height of each; none beside a slope that stands higher.
     row: Vec<Option<usize>>,
+    /// The same, with the column's end for what stands higher or lower.
+    row_or_end: Vec<usize>,
 }
 
 impl Strip {
@@ -487,16 +600,12 @@ impl Strip {
         let local: Vec<usize> = (0..position.len())
             .filter(|&node| outer - position[node].dot(&hand.normal()) < reach + model.spacing.x)
             .collect();
-        let first = side.first().map_or(0.0, |&node| model.position[node].y);
-        let row_of = |node: usize| {
-            let row = ((model.position[node].y - first) / model.spacing.y).round();
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked to be a row
-            (row >= 0.0 && row < side.len() as f64).then_some(row as usize)
-        };
+        let rows = Rows::of(section, hand);
         let mut strip = Self {
             position: local.iter().map(|&node| position[node]).collect(),
             volume: local.iter().map(|&node| phases.volume()[node]).collect(),
-            row: local.iter().map(|&node| row_of(node)).collect(),
+            row: local.iter().map(|&node| rows.at(model.position[node].y)).collect(),
+            row_or_end: local.iter().map(|&node| rows.nearest(model.position[node].y)).collect(),
             local,
         };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a handful of columns
@@ -506,6 +615,7 @@ impl Strip {
                 strip.position.push(position[node] + hand.normal() * (repeat as f64 * model.spacing.x));
                 strip.volume.push(phases.volume()[node]);
                 strip.row.push(Some(row));
+                strip.row_or_end.push(row);
             }
         }
         strip

@@ -8,7 +8,10 @@ use sandboil_sph::{
     Csr, GradientWeight, LeastSquaresFit, Mat2, NeighbourList, Period, Vec2, WendlandQuintic,
     operators::{Member, consistent_fit, corrected_gradient, interpolation, laplacian_factor, stencil},
 };
-use std::ops::{AddAssign, MulAssign};
+use std::{
+    collections::BTreeMap,
+    ops::{AddAssign, MulAssign},
+};
 
 /// Skin of the neighbour lists over the particle spacing: the lists survive displacements of half of it.
 const SKIN: f64 = 0.3;
@@ -232,6 +235,19 @@ impl Geometry {
             flow,
             printed,
             list,
+        }
+    }
+
+    /// Lets strain and divergence see velocities beside those of the nodes, from index `nodes` on. No force goes back
+    /// to them.
+    pub fn see_guests(
+        &mut self,
+        strain: BTreeMap<usize, Vec<(u32, VectorWeight)>>,
+        divergence: BTreeMap<usize, Vec<(u32, Vec2)>>,
+    ) {
+        self.wall.forward = self.wall.forward.with_more(strain);
+        if let Some(flow) = &mut self.flow {
+            flow.divergence.forward = flow.divergence.forward.with_more(divergence);
         }
     }
 

@@ -256,6 +256,7 @@ impl Simulation {
         }
         (self.dt, self.criterion) = self.limit(PressureCoupling::None, RELAXATION_FACTOR);
         self.begin(Active::Gravity { stage, kinetic_energy: 0.0, residual: f64::INFINITY, at_rest: false });
+        self.set_guests(0);
         self.velocity.fill(Vec2::zeros());
         self.refresh_shares(&vec![Vec2::zeros(); self.model.nodes()]);
         Ok(())
@@ -330,6 +331,10 @@ impl Simulation {
         if let (Some(flow), Some(excess)) = (&mut self.flow, excess) {
             flow.excess = excess;
         }
+        if let Some(free_field) = &free_field {
+            self.set_guests(free_field.guests());
+            free_field.tie(&mut self.geometry, self.model.nodes());
+        }
         let coupling = match (&self.flow, scheme) {
             (None, _) => PressureCoupling::None,
             (_, FlowScheme::Implicit) => PressureCoupling::Implicit,
@@ -371,7 +376,7 @@ impl Simulation {
 
     /// Force of stress and pressure alone on every node, kN/m: without the velocity filter.
     fn static_force(&mut self) -> Vec<Vec2> {
-        self.refresh_shares(&vec![Vec2::zeros(); self.model.nodes()]);
+        self.refresh_shares(&vec![Vec2::zeros(); self.velocity.len()]);
         self.prepare_printed_stress();
         (0..self.model.nodes()).map(|j| self.internal_force(j, Vec2::zeros())).collect()
     }
@@ -389,6 +394,7 @@ impl Simulation {
             free_field.renew_columns();
             let outline = self.present_outline();
             free_field.renew(&self.section(&outline));
+            free_field.tie(&mut self.geometry, self.model.nodes());
         }
         for ((constant, before), after) in self.constant_force.iter_mut().zip(before).zip(after) {
             *constant += before - after;
@@ -396,6 +402,13 @@ impl Simulation {
         let velocity = std::mem::take(&mut self.velocity);
         self.refresh_shares(&velocity);
         self.velocity = velocity;
+    }
+
+    /// Makes room for the velocities of free-field columns behind those of the nodes.
+    fn set_guests(&mut self, guests: usize) {
+        for motion in [&mut self.velocity, &mut self.acceleration] {
+            motion.resize(self.model.nodes() + guests, Vec2::zeros());
+        }
     }
 
     /// The edges where they now stand: in shaking they go with the nodes along them, as far as they are free to.
@@ -701,7 +714,8 @@ impl Simulation {
         let mut sums = std::mem::take(&mut self.sums);
         let mut unit = std::mem::take(&mut self.unit);
         let threaded = self.threads > 1;
-        let rows = Rows { a: &mut velocity, b: &mut acceleration, c: &mut unit };
+        let nodes = self.model.nodes();
+        let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: &mut unit };
         let this = &*self;
         for_each_chunk(threaded, rows, &mut sums, |first, rows, sum| {
             *sum = MotionSum::default();
@@ -822,6 +836,7 @@ impl Simulation {
         shaking.base.end_step(self.time, dt, &self.mass, (&mut *motion.0, &mut *motion.1));
         if let Some(free_field) = &mut shaking.free_field {
             free_field.end_step(dt, &self.mass, motion.0, motion.1);
+            free_field.lend(&mut motion.0[self.mass.len()..], &mut motion.1[self.mass.len()..]);
             self.counters.free_field_calls += 1;
         }
         if shaking.stage.local_damping > 0.0 {
@@ -979,6 +994,11 @@ impl Simulation {
     /// Velocity of a node, m/s.
     pub(crate) fn velocity_of(&self, node: usize) -> Vec2 {
         self.velocity[node]
+    }
+
+    /// Acceleration of a node, m/s2.
+    pub(crate) fn acceleration_of(&self, node: usize) -> Vec2 {
+        self.acceleration[node]
     }
 
     /// All stress nodes.

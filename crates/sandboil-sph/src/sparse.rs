@@ -1,6 +1,6 @@
 //! Compressed sparse rows: the one container of every particle operator.
 
-use std::ops::AddAssign;
+use std::{collections::BTreeMap, ops::AddAssign};
 
 /// A sparse table in compressed-row form. Columns rise within a row and occur once.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +42,19 @@ impl<T: Copy + AddAssign> Csr<T> {
             }
         }
         self.start.push(index(self.column.len()));
+    }
+
+    /// The table with more entries in some of its rows.
+    #[must_use]
+    pub fn with_more(&self, mut more: BTreeMap<usize, Vec<(u32, T)>>) -> Self {
+        let mut table = Self::with_capacity(self.rows(), self.entries());
+        for row in 0..self.rows() {
+            let (columns, values) = self.row(row);
+            let mut entries: Vec<(u32, T)> = columns.iter().copied().zip(values.iter().copied()).collect();
+            entries.extend(more.remove(&row).unwrap_or_default());
+            table.push_row(&mut entries);
+        }
+        table
     }
 
     /// The table with rows and columns exchanged; rows of the result hold their columns in rising order.
