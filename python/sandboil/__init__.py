@@ -6,7 +6,9 @@ pressures reported to people are positive in compression. Start with :class:`Sce
 
 from . import lab
 from ._core import __version__
-from ._errors import InvalidInput, RunInterrupted, SandboilError, SimulationDiverged
+from ._errors import InvalidInput, RunInterrupted, SandboilError, SandboilWarning, SimulationDiverged
+from ._motion_spec import MotionSpec
+from .boundaries import BaseSegment, CompliantBase, Fixed, FreeField, Periodic, Roller, Sides
 from .discretise import Discretisation, discretise
 from .materials import DruckerPrager, Elastic, MohrCoulomb, PM4Sand, PressureElastic, TotalStress
 from .motion import Motion, ResponseSpectrum, response_spectrum
@@ -15,12 +17,9 @@ from .results import History, Profile, Run, Summary, Surface, load
 from .run import run
 from .scene import (
     Box,
-    CompliantBase,
     Gravity,
-    MotionSpec,
     Numerics,
     Output,
-    Periodic,
     Polygon,
     Rayleigh,
     Region,
@@ -35,11 +34,14 @@ from .simulation import Simulation
 from .site import HalfSpace, ModulusCurve, SiteLayer, SiteProfile
 
 __all__ = [
+    "BaseSegment",
     "Box",
     "CompliantBase",
     "Discretisation",
     "DruckerPrager",
     "Elastic",
+    "Fixed",
+    "FreeField",
     "Gravity",
     "HalfSpace",
     "History",
@@ -59,11 +61,14 @@ __all__ = [
     "Rayleigh",
     "Region",
     "ResponseSpectrum",
+    "Roller",
     "Run",
     "RunInterrupted",
     "SandboilError",
+    "SandboilWarning",
     "Scene",
     "Shaking",
+    "Sides",
     "Simulation",
     "SimulationDiverged",
     "SiteLayer",

@@ -74,6 +74,10 @@ class SimulationDiverged(SandboilError):
         )
 
 
+class SandboilWarning(UserWarning):
+    """An answer that may not be what was meant: the text says why, and what would mend it."""
+
+
 class RunInterrupted(SandboilError):
     """The user stopped the run; the result file is complete up to the last frame."""
 

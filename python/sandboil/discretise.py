@@ -9,7 +9,8 @@ import shapely
 from numpy.typing import NDArray
 
 from ._errors import InvalidInput
-from .scene import COORDINATE_TOLERANCE, Scene
+from .boundaries import COORDINATE_TOLERANCE, Periodic
+from .scene import Scene
 
 Floats = NDArray[np.float64]
 
@@ -28,6 +29,7 @@ class Overburden:
     bounds: tuple[float, float, float, float]
     water_level: float | None
     water_unit_weight: float
+    is_periodic: bool
 
     @classmethod
     def of(cls, scene: Scene) -> Overburden:
@@ -41,6 +43,7 @@ class Overburden:
             bounds=scene.bounds,
             water_level=scene.water_level,
             water_unit_weight=0.0 if scene.water is None else scene.water.unit_weight,
+            is_periodic=isinstance(scene.sides, Periodic),
         )
 
     def surface_elevation(self, x: Floats) -> Floats:
@@ -81,10 +84,11 @@ class Overburden:
     def _verticals(self, x: Floats) -> tuple[NDArray[np.object_], NDArray[np.intp]]:
         """One vertical line through the whole section per distinct x, and the line of each point.
 
-        Points beyond a periodic side are taken where they lie inside.
+        Points beyond a periodic side are taken where they lie inside, others beyond a side at that side.
         """
         x0, y0, x1, y1 = self.bounds
-        inside = np.where((x < x0) | (x > x1), x0 + np.mod(x - x0, x1 - x0), x)
+        beyond = x0 + np.mod(x - x0, x1 - x0) if self.is_periodic else np.clip(x, x0, x1)
+        inside = np.where((x < x0) | (x > x1), beyond, x)
         # A vertical along an upright edge would count the soils on both of its sides: it is moved off it,
         # to the right, or from the right side of the section to the left.
         corners = np.unique(shapely.get_coordinates(self.outlines)[:, 0])

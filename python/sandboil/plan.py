@@ -192,7 +192,7 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
         while not done and time.perf_counter() < trial_end:
             done = simulation.advance(np.inf, LOOK_INTERVAL)
         spent, made = time.perf_counter() - start, simulation.steps
-        duration = None if isinstance(stage, Gravity) else stage.resolved_duration
+        duration = None if isinstance(stage, Gravity) else scene.duration(stage)
         step_time = spent / max(made, 1)
         steps = made if done else None if duration is None else round(duration / dt)
         stages.append(

@@ -31,11 +31,12 @@ import numpy.typing as npt
 
 from . import _core
 from ._errors import InvalidInput, SandboilError
+from .boundaries import COORDINATE_TOLERANCE
 from .discretise import Floats
 from .motion import Motion, ResponseSpectrum, response_spectrum
 from .motion._series import STANDARD_GRAVITY, butterworth
 from .plan import described_coefficient, pore_pressure_coefficients
-from .scene import COORDINATE_TOLERANCE, Scene
+from .scene import Scene
 from .simulation import (
     FIELDS,
     HISTORIES,

@@ -6,30 +6,37 @@ in Python can be said in TOML with the same names, where `kind` takes the place 
 
 from __future__ import annotations
 
-import inspect
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
+import numpy as np
 import shapely
-from pydantic import BeforeValidator, Field, StrictBool, ValidationInfo, field_validator, model_validator
+from pydantic import Field, StrictBool, model_validator
 from shapely.geometry.base import BaseGeometry
 
 from . import _core, _toml
-from ._errors import InvalidInput, nearest_name
+from ._errors import InvalidInput
 from ._model import Many, Model, Number
+from ._motion_spec import GivenMotion, MotionSpec
+from .boundaries import (
+    COORDINATE_TOLERANCE,
+    AnySides,
+    Arrival,
+    CompliantBase,
+    Periodic,
+    Point,
+    Sides,
+)
 from .materials import Elastic, Material, NonNegative, PM4Sand, Positive
+from .outline import Outline
 
 if TYPE_CHECKING:
     from .motion import Motion
     from .plan import Plan
     from .site._profile import CurveChoice, SiteProfile
-
-# Coordinates closer than this are the same point, m: far below any spacing, far above round-off of a
-# kilometre-wide section.
-COORDINATE_TOLERANCE = 1.0e-6
 
 # Density of water where a scene without water gives Gs, Mg/m3: the scenes' usual 10 kN/m3 at 9.81 m/s2.
 REFERENCE_WATER_DENSITY = 10.0 / 9.81
@@ -44,6 +51,9 @@ MAX_CELLS = 10_000_000
 # Most frames of a run: a frame holds every field of every node.
 MAX_FRAMES = 100_000
 
+# Least height of a side that is a wall or a free field, in spacings: a single row would have no depth in it.
+LEAST_SIDE_ROWS = 2
+
 # Thickness of the layers that a profile is divided into, m: a fifth of the wavelength at 20 Hz in soil of
 # 100 m/s.
 DEFAULT_LAYER = 1.0
@@ -51,7 +61,6 @@ DEFAULT_LAYER = 1.0
 # Relative mismatch up to which densities given twice are the same: they come with three to four digits.
 DENSITY_TOLERANCE = 1.0e-3
 
-Point = tuple[Number, Number]
 Count = Annotated[int, Field(strict=True, ge=1)]
 Poisson = Annotated[Number, Field(ge=0.0, lt=0.5)]
 # Hz, far beyond earthquakes and sites on both sides; outside, damping would make time steps of nothing.
@@ -341,16 +350,8 @@ class WaterTable(Model):
         return self
 
 
-class Periodic(Model):
-    """What leaves on one side enters on the other: an infinitely wide repetition of the section."""
-
-    _label: ClassVar[str] = "sides"
-
-    kind: Literal["periodic"] = "periodic"
-
-
 class Gravity(Model):
-    """Static stage: self-weight on a fixed base with elastic soils, to rest.
+    """Static stage: self-weight with elastic soils, to rest, on a base that is rough or smooth.
 
     It ends when the largest acceleration falls below `tolerance` (of gravity). Poisson's ratio is K0/(1 + K0)
     of each region unless `initial_poisson_ratio` is given for all.
@@ -362,124 +363,7 @@ class Gravity(Model):
     tolerance: Number = Field(default=1.0e-4, gt=0.0, lt=1.0, description="largest acceleration over gravity")
     max_steps: Count = 200_000
     initial_poisson_ratio: Poisson | None = None
-
-
-class CompliantBase(Model):
-    """Half-space below the section that lets downgoing waves leave.
-
-    Its impedance is that of the soil at the base when the stage begins, unless both are given.
-    """
-
-    _label: ClassVar[str] = "base"
-
-    kind: Literal["compliant"] = "compliant"
-    Vs: Positive | None = Field(default=None, description="shear wave velocity, m/s")
-    density: Positive | None = Field(default=None, description="Mg/m3")
-
-    @model_validator(mode="after")
-    def _both_or_none(self) -> CompliantBase:
-        if (self.Vs is None) != (self.density is None):
-            raise InvalidInput(
-                "base",
-                {"Vs": self.Vs, "density": self.density},
-                "must have both Vs and density, or neither: then the soil at the base gives its own",
-            )
-        return self
-
-
-class MotionSpec(Model):
-    """Where a ground motion comes from, so that a scene can be written down.
-
-    Exactly one source: `file` (PEER .AT2, or a CSV with its `unit` and `column` unless its header tells),
-    `synthetic` or `ricker` (arguments of the :class:`Motion` constructors of those names), or `dt` with
-    `acceleration_g` or `velocity` (m/s). `scale` multiplies the motion.
-    """
-
-    _label: ClassVar[str] = "motion"
-
-    file: str | None = Field(default=None, description="path, relative to the scene's file")
-    unit: str | None = Field(default=None, description="unit of a CSV's values")
-    column: Annotated[int, Field(strict=True, ge=0)] | str | None = None
-    synthetic: dict[str, int | Number] | None = None
-    ricker: dict[str, int | Number] | None = None
-    dt: Positive | None = Field(default=None, description="time between samples, s")
-    acceleration_g: Many[Number] | None = None
-    velocity: Many[Number] | None = Field(default=None, description="m/s")
-    kind: Literal["outcrop", "within", "upgoing"] = "outcrop"
-    scale: Number | None = None
-
-    @field_validator("synthetic", "ricker")
-    @classmethod
-    def _complete(cls, said: dict[str, float] | None, field: ValidationInfo) -> dict[str, float] | None:
-        """Check the generator's arguments and write its defaults out: the scene then keeps its meaning."""
-        if said is None:
-            return None
-        from .motion import Motion
-
-        generator = str(field.field_name)
-        known = dict(inspect.signature(getattr(Motion, generator)).parameters)
-        known.pop("kind", None)
-        for name, value in said.items():
-            if name not in known:
-                meant = nearest_name(name, known)
-                raise InvalidInput(
-                    f"{generator}.{name}",
-                    value,
-                    f"unknown key, known are {', '.join(known)}",
-                    f"did you mean {meant!r}?" if meant else None,
-                )
-        for name, parameter in known.items():
-            if parameter.default is inspect.Parameter.empty and name not in said:
-                raise InvalidInput(f"{generator}.{name}", None, "is required")
-        defaults = {name: parameter.default for name, parameter in known.items()}
-        complete = defaults | said
-        return {name: complete[name] for name in known if complete[name] is not None}
-
-    @model_validator(mode="after")
-    def _one_source(self) -> MotionSpec:
-        sources = ("file", "synthetic", "ricker", "acceleration_g", "velocity")
-        given = [name for name in sources if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise InvalidInput("motion", given, f"must have exactly one source of {', '.join(sources)}")
-        source = given[0]
-        if (self.dt is not None) != (source in ("acceleration_g", "velocity")):
-            raise InvalidInput("motion.dt", self.dt, "goes with acceleration_g or velocity, and they with it")
-        return self
-
-    @classmethod
-    def of(cls, motion: Motion) -> MotionSpec:
-        """How to write `motion` down: by its source if it is unchanged since, else by its samples."""
-        if motion.source is None:
-            samples: dict[str, Any] = {motion.quantity: getattr(motion, motion.quantity)}
-            return cls(dt=motion.dt, kind=motion.kind, **samples)
-        source = dict(motion.source)
-        if "file" in source:
-            # Said relative to the working folder; a scene's file may be written anywhere.
-            source["file"] = str(Path(source["file"]).absolute())
-        return cls(**source)
-
-    def load(self) -> Motion:
-        """The motion itself; :class:`InvalidInput` if its file or its numbers are no motion."""
-        from .motion import Motion
-
-        if self.file is not None:
-            motion = Motion.from_file(self.file, unit=self.unit, column=self.column, kind=self.kind)
-        elif self.synthetic is not None:
-            motion = Motion.synthetic(**dict[str, Any](self.synthetic), kind=self.kind)
-        elif self.ricker is not None:
-            motion = Motion.ricker(**dict[str, Any](self.ricker), kind=self.kind)
-        else:
-            samples: dict[str, Any] = self.model_dump(include={"dt", "acceleration_g", "velocity", "kind"})
-            motion = Motion(**samples)
-        return motion if self.scale is None else motion.scaled(factor=self.scale)
-
-
-def _motion_spec(value: object) -> object:
-    if value is None or isinstance(value, (dict, MotionSpec)):
-        return value
-    from .motion import Motion
-
-    return MotionSpec.of(value) if isinstance(value, Motion) else value
+    base: Literal["no-slip", "free-slip"] = "no-slip"
 
 
 class Rayleigh(Model):
@@ -523,15 +407,17 @@ class Shaking(Model):
     """Dynamic stage on a compliant base: PM4Sand at work, water flowing.
 
     Without a motion the ground stands on its dashpots for `duration` seconds. With one, `duration` is that of
-    the motion unless given; a longer one adds quiet time. `rayleigh` damps beside the soil's own
-    hysteresis.
+    the motion and of its way along the base unless given; a longer one adds quiet time. `vertical` is the
+    vertical component of the same record (same kind and spacing), positive upwards; the base then absorbs
+    vertically too. `rayleigh` damps beside the soil's own hysteresis.
     """
 
     _label: ClassVar[str] = "stage"
     _positional: ClassVar[tuple[str, ...]] = ("motion",)
 
     kind: Literal["shaking"] = "shaking"
-    motion: Annotated[MotionSpec | None, BeforeValidator(_motion_spec)] = None
+    motion: GivenMotion = None
+    vertical: GivenMotion = None
     base: CompliantBase = CompliantBase()
     duration: Positive | None = Field(default=None, description="s")
     rayleigh: Rayleigh | None = None
@@ -542,6 +428,7 @@ class Shaking(Model):
             self,
             motion: Motion | MotionSpec | None = None,
             *,
+            vertical: Motion | MotionSpec | None = None,
             base: CompliantBase = ...,
             duration: float | None = None,
             rayleigh: Rayleigh | None = None,
@@ -549,17 +436,73 @@ class Shaking(Model):
 
     @model_validator(mode="after")
     def _some_duration(self) -> Shaking:
-        if self.motion is None and self.duration is None:
+        if self.duration is None and not any(motion for _, motion in self.motions):
             raise InvalidInput("stage.duration", None, "is required when there is no motion", "in seconds")
         return self
 
+    @model_validator(mode="after")
+    def _vertical_motion_fits(self) -> Shaking:
+        if self.vertical is not None:
+            if self.base.vertical == "roller":
+                raise InvalidInput(
+                    "stage.base.vertical",
+                    self.base.vertical,
+                    "must be 'absorbing' under a vertical motion: a roller does not move",
+                    "leave it out",
+                )
+            if self.motion is not None and self.motion.kind != self.vertical.kind:
+                raise InvalidInput(
+                    "stage.vertical.kind",
+                    self.vertical.kind,
+                    f"must be that of the horizontal motion, {self.motion.kind!r}",
+                    "take both components of the same record",
+                )
+            own = [i for i, segment in enumerate(self.base.segments) if segment.motion is not None]
+            if own:
+                raise InvalidInput(
+                    f"stage.base.segments[{own[0]}].motion",
+                    self.base.segments[own[0]].motion,
+                    "must be left out beside a vertical motion, which is a component of the stage's motion",
+                    "give the segments delays alone",
+                )
+        if self.base_vertical == "absorbing" and self.base.Vs is not None and self.base.Vp is None:
+            raise InvalidInput(
+                "stage.base.Vp",
+                None,
+                "is required beside Vs on a base that absorbs vertically",
+                "Vp = Vs sqrt((2 - 2 nu)/(1 - 2 nu)); or leave Vs and density out too",
+            )
+        return self
+
     @property
-    def resolved_duration(self) -> float:
-        """Duration in s: as given, or else that of the motion, which is read for it."""
-        if self.duration is not None:
-            return self.duration
-        assert self.motion is not None
-        return self.motion.load().duration
+    def base_vertical(self) -> Literal["roller", "absorbing"]:
+        """What the base is vertically: as given, or else what the vertical motion needs."""
+        return self.base.vertical or ("roller" if self.vertical is None else "absorbing")
+
+    @property
+    def motions(self) -> list[tuple[str, MotionSpec | None]]:
+        """Every motion of the stage with its place in it."""
+        segments = [
+            (f"base.segments[{i}].motion", segment.motion) for i, segment in enumerate(self.base.segments)
+        ]
+        return [("motion", self.motion), ("vertical", self.vertical), *segments]
+
+    def with_motions(self, change: Callable[[MotionSpec], MotionSpec]) -> Shaking:
+        """The same stage with every motion changed."""
+        update: dict[str, Any] = {}
+        if self.motion is not None:
+            update["motion"] = change(self.motion)
+        if self.vertical is not None:
+            update["vertical"] = change(self.vertical)
+        if any(segment.motion for segment in self.base.segments):
+            segments = tuple(
+                segment
+                if segment.motion is None
+                else segment.model_copy(update={"motion": change(segment.motion)})
+                for segment in self.base.segments
+            )
+            update["base"] = self.base.model_copy(update={"segments": segments})
+        return self.model_copy(update=update)
 
 
 Stage = Annotated[Gravity | Shaking, Field(discriminator="kind")]
@@ -653,7 +596,7 @@ class Scene(Model):
     water: Water | None = None
     water_table: WaterTable | None = None
     regions: Many[Region] = Field(min_length=1)
-    sides: Periodic = Periodic()
+    sides: AnySides = Periodic()
     stages: Many[Stage] = Field(min_length=1)
     output: Output = Output()
     numerics: Numerics = Numerics()
@@ -671,6 +614,7 @@ class Scene(Model):
         self._check_densities()
         self._check_materials()
         self._check_stages()
+        self._check_bases()
         self._check_damping()
         self._check_output()
         return self
@@ -718,22 +662,53 @@ class Scene(Model):
                 "must fill the section without gaps",
                 f"a hole lies in x {x0:g} to {x1:g}, y {y0:g} to {y1:g}",
             )
-        x0, y0, x1, y1 = self.bounds
-        base = section.intersection(shapely.LineString([(x0, y0), (x1, y0)]))
-        if base.length < x1 - x0 - COORDINATE_TOLERANCE:
+        outline = self.outline
+        if isinstance(self.sides, Periodic):
+            self._check_periodic(outline)
+        else:
+            self._check_sides(outline)
+
+    def _check_periodic(self, outline: Outline) -> None:
+        x0, _, x1, _ = self.bounds
+        if not outline.base_is_level:
+            y = outline.base[:, 1]
             raise InvalidInput(
                 "scene.regions",
                 [region.name for region in self.regions],
-                f"must stand on a level base: only {base.length:g} m of {x1 - x0:g} m lie at y = {y0:g}",
+                "must stand on a level base between periodic sides, but it lies between "
+                f"y = {y.min():g} and {y.max():g} m",
+                "sides = FreeField() takes any base",
             )
         left, right = (self._side_profile(x) for x in (x0, x1))
         if not left or left != right:
             raise InvalidInput(
                 "scene.sides",
-                "periodic",
+                self.sides.kind,
                 "needs straight vertical sides, the same soils at the same levels on both",
                 f"left: {left or 'no vertical side'}; right: {right or 'no vertical side'}",
             )
+
+    def _check_sides(self, outline: Outline) -> None:
+        least = LEAST_SIDE_ROWS * self.spacing
+        x0, _, x1, _ = self.bounds
+        edges = (("left", x0, outline.left), ("right", x1, outline.right))
+        for (hand, x, (bottom, top)), kind in zip(edges, self.side_kinds, strict=True):
+            if top - bottom < least - COORDINATE_TOLERANCE:
+                raise InvalidInput(
+                    "scene.sides",
+                    kind,
+                    f"needs a straight vertical edge of at least {LEAST_SIDE_ROWS} spacings, {least:g} m, on "
+                    f"the {hand}, which has {top - bottom:g} m",
+                    "where a slope reaches the side, extend the section by level ground that ends upright",
+                )
+            if (np.abs(outline.surface[1:-1, 0] - x) <= COORDINATE_TOLERANCE).any():
+                raise InvalidInput(
+                    "scene.sides",
+                    kind,
+                    f"needs one straight vertical edge on the {hand}, but the section reaches x = {x:g} m "
+                    f"again above {top:g} m",
+                    "fill the section up to the side, or let only its lowest part reach it",
+                )
 
     def _side_profile(self, x: float) -> list[tuple[str, float, float]]:
         """Soils of a side of the section as (name, bottom, top), lowest first; empty if not straight."""
@@ -830,6 +805,68 @@ class Scene(Model):
             if isinstance(stage, Gravity):
                 raise InvalidInput(f"scene.stages[{i}].kind", "gravity", "must be the first stage only")
 
+    def _check_bases(self) -> None:
+        shaken = [(i, stage) for i, stage in enumerate(self.stages) if isinstance(stage, Shaking)]
+        for i, stage in shaken:
+            path = f"scene.stages[{i}].base"
+            first = shaken[0][1].base_vertical
+            if stage.base_vertical != first:
+                # The force that holds the weight is that of the moment when the first shaking began.
+                raise InvalidInput(
+                    f"{path}.vertical",
+                    stage.base_vertical,
+                    f"must be as in the first shaking stage, {first!r}",
+                    "say base = CompliantBase(vertical='absorbing') in every one of them",
+                )
+            if stage.base.Vs is not None and stage.base.Vp is None and not self.outline.base_is_level:
+                raise InvalidInput(
+                    f"{path}.Vp",
+                    None,
+                    "is required beside Vs under a base that is not level: there it resists both waves",
+                    "Vp = Vs sqrt((2 - 2 nu)/(1 - 2 nu)); or leave Vs and density out too",
+                )
+            self._check_arrivals(stage, path)
+
+    def _check_arrivals(self, stage: Shaking, path: str) -> None:
+        base = stage.base
+        x0, _, x1, _ = self.bounds
+        name = "segments" if base.segments else "apparent_velocity"
+        said = getattr(base, name)
+        if not said:
+            return
+        if isinstance(self.sides, Periodic):
+            raise InvalidInput(
+                f"{path}.{name}",
+                said,
+                "must be left out between periodic sides: what differs along the base is not periodic",
+                "sides = FreeField()",
+            )
+        arrivals = base.arrivals(x0, x1)
+        if base.segments:
+            ends = [x0, *(end for arrival in arrivals for end in arrival.x), x1]
+            for before, after in zip(ends[::2], ends[1::2], strict=True):
+                if abs(after - before) > COORDINATE_TOLERANCE:
+                    told = "overlap" if after < before else "leave a gap"
+                    low, high = sorted((before, after))
+                    raise InvalidInput(
+                        f"{path}.segments",
+                        [arrival.x for arrival in arrivals],
+                        f"must cover the base, x {x0:g} to {x1:g} m, side by side, but they {told} from "
+                        f"{low:g} to {high:g}",
+                    )
+        duration = stage.duration
+        for arrival in arrivals:
+            if duration is not None and arrival.latest >= duration:
+                # The place that the user gave a segment, not the one from left to right.
+                given = [segment.x for segment in base.segments]
+                raise InvalidInput(
+                    f"{path}.segments[{given.index(arrival.x)}].delay" if given else f"{path}.{name}",
+                    arrival.delay if given else said,
+                    f"must let the wave arrive before the stage ends: it takes {arrival.latest:g} of "
+                    f"{duration:g} s",
+                    "a longer duration",
+                )
+
     def _check_damping(self) -> None:
         for i, stage in enumerate(self.stages):
             if isinstance(stage, Shaking) and stage.rayleigh and self.numerics.operators == "printed":
@@ -842,7 +879,7 @@ class Scene(Model):
                 )
 
     def _check_output(self) -> None:
-        _, bottom, _, top = self.bounds
+        left, bottom, right, top = self.bounds
         for stage in self.stages:
             duration = stage.duration if isinstance(stage, Shaking) else None
             if duration is not None and duration / self.output.field_dt > MAX_FRAMES:
@@ -855,12 +892,15 @@ class Scene(Model):
         for i, depth in enumerate(self.output.depths):
             if depth in self.output.depths[:i]:
                 raise InvalidInput(f"scene.output.depths[{i}]", depth, "is named twice")
+        x = 0.5 * (left + right)
+        ends = shapely.LineString([(x, bottom), (x, top)]).intersection(self.section).bounds
+        thickness = ends[3] - self.outline.base_elevation(x)
         for i, depth in enumerate(self.output.depths):
-            if not 0.0 <= depth <= top - bottom:
+            if not 0.0 <= depth <= thickness + COORDINATE_TOLERANCE:
                 raise InvalidInput(
                     f"scene.output.depths[{i}]",
                     depth,
-                    f"must lie in the section, [0, {top - bottom:g}] m",
+                    f"must lie in the mid column, [0, {thickness:g}] m",
                     "depths are positive downwards from the surface",
                 )
         section = shapely.buffer(self.section, COORDINATE_TOLERANCE)
@@ -876,6 +916,35 @@ class Scene(Model):
     def section(self) -> BaseGeometry:
         """All regions joined, as shapely geometry."""
         return shapely.union_all([region.geometry for region in self.regions], grid_size=COORDINATE_TOLERANCE)
+
+    @property
+    def outline(self) -> Outline:
+        """Base, sides and ground surface of the section."""
+        return Outline.of(self.section)
+
+    @property
+    def side_kinds(self) -> tuple[str, str]:
+        """Kind of the left and of the right side."""
+        sides = self.sides
+        return (sides.left.kind, sides.right.kind) if isinstance(sides, Sides) else (sides.kind, sides.kind)
+
+    def arrivals(self, stage: Shaking) -> list[Arrival]:
+        """The stretches of the base and the waves that come to them in a stage, from left to right."""
+        x0, _, x1, _ = self.bounds
+        return stage.base.arrivals(x0, x1)
+
+    def duration(self, stage: Gravity | Shaking) -> float | None:
+        """Duration of a stage in s: as given, or else until the last motion has passed, which is read.
+
+        None for gravity, which ends at rest.
+        """
+        if isinstance(stage, Gravity) or stage.duration is not None:
+            return stage.duration if isinstance(stage, Shaking) else None
+        own = max(motion.load().duration if motion else 0.0 for motion in (stage.motion, stage.vertical))
+        return max(
+            arrival.latest + (arrival.motion.load().duration if arrival.motion else own)
+            for arrival in self.arrivals(stage)
+        )
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -918,10 +987,13 @@ class Scene(Model):
         permeable = [region.name for region in self.regions if region.hydraulic_conductivity]
         # Linear elasticity remembers nothing but the stress.
         stateful = [region.name for region in self.regions if not isinstance(region.material, Elastic)]
-        shaken = any(isinstance(stage, Shaking) for stage in self.stages)
+        shakings = [stage for stage in self.stages if isinstance(stage, Shaking)]
+        shaken = bool(shakings)
         damping = self.numerics.local_damping
-        damped = [stage.rayleigh for stage in self.stages if isinstance(stage, Shaking) and stage.rayleigh]
+        damped = [stage.rayleigh for stage in shakings if stage.rayleigh]
         dry, still = "the scene has no water", "no shaking stage"
+        absorbing = [stage for stage in shakings if stage.base_vertical == "absorbing"]
+        passing = [told for stage in shakings if (told := _passage(stage.base))]
 
         def active(name: str, reason: str, *missing: tuple[bool, str]) -> tuple[str, bool, str]:
             """`name` is active for its reason, unless something is missing: then the first such reason."""
@@ -946,7 +1018,25 @@ class Scene(Model):
                 (not shaken, still),
             ),
             active("base dashpots", "compliant base while shaking", (not shaken, still)),
-            ("free-field columns", False, "the sides are periodic"),
+            active(
+                "vertical waves",
+                "under a vertical motion" if any(s.vertical for s in absorbing) else "the base absorbs them",
+                (not shaken, still),
+                (not absorbing, "the base is a roller vertically"),
+            ),
+            active(
+                "wave passage",
+                "; ".join(passing),
+                (not shaken, still),
+                (not passing, "the wave reaches all of the base at once"),
+            ),
+            active(
+                "free-field columns",
+                self._columns_told(),
+                (isinstance(self.sides, Periodic), "the sides are periodic"),
+                ("free-field" not in self.side_kinds, f"the sides are {' and '.join(self.side_kinds)}"),
+                (not shaken, still),
+            ),
             active(
                 "local damping",
                 f"numerics.local_damping is {damping:g}",
@@ -968,6 +1058,23 @@ class Scene(Model):
             ),
         ]
 
+    def _columns_told(self) -> str:
+        """Which sides have a column, and how many particles all columns together."""
+        x0, _, x1, _ = self.bounds
+        edges = ((x0, "left", self.outline.left), (x1, "right", self.outline.right))
+        free = [
+            (self._side_profile(x), round((top - bottom) / self.spacing), hand)
+            for (x, hand, (bottom, top)), kind in zip(edges, self.side_kinds, strict=True)
+            if kind == "free-field"
+        ]
+        hands = " and ".join(hand for _, _, hand in free)
+        passing = any(isinstance(stage, Shaking) and _passage(stage.base) for stage in self.stages)
+        alike = len(free) == 2 and free[0][0] == free[1][0] and not passing
+        distinct = free[:1] if alike else free
+        particles = sum(rows for _, rows, _ in distinct)
+        number = f"{len(distinct)} column{'s' if len(distinct) > 1 else ''}"
+        return f"on the {hands}: {number} of {particles} particles{' in all' if len(distinct) > 1 else ''}"
+
     def with_motion(self, motion: Motion | MotionSpec) -> Scene:
         """The same scene shaken by another motion, in every stage that has one."""
         spec = motion if isinstance(motion, MotionSpec) else MotionSpec.of(motion)
@@ -978,6 +1085,14 @@ class Scene(Model):
                 self.stage_names,
                 "must hold a shaking stage with a motion for another to replace it",
             )
+        for i, stage in enumerate(self.stages):
+            if isinstance(stage, Shaking) and stage.motion is not None and stage.vertical is not None:
+                raise InvalidInput(
+                    f"scene.stages[{i}].vertical",
+                    stage.vertical,
+                    "is a component of the motion that another would replace",
+                    "make the scene with Shaking(motion, vertical=...)",
+                )
         stages = tuple(
             stage.model_copy(update={"motion": spec}) if has_motion else stage
             for stage, has_motion in zip(self.stages, shaken, strict=True)
@@ -1049,9 +1164,13 @@ class Scene(Model):
         return scene.model_copy(update={"stages": stages})
 
 
+def _passage(base: CompliantBase) -> str:
+    """How a wave comes to different places of a base at different times; empty where it does not."""
+    if base.apparent_velocity is not None:
+        return f"at an apparent {base.apparent_velocity:g} m/s"
+    return f"{len(base.segments)} segments" if len(base.segments) > 1 else ""
+
+
 def _anchored(stage: Gravity | Shaking, folder: Path) -> Gravity | Shaking:
-    """The stage with its motion's file found from `folder`."""
-    if not isinstance(stage, Shaking) or stage.motion is None or stage.motion.file is None:
-        return stage
-    motion = stage.motion.model_copy(update={"file": str(folder.absolute() / stage.motion.file)})
-    return stage.model_copy(update={"motion": motion})
+    """The stage with its motions' files found from `folder`."""
+    return stage.with_motions(lambda spec: spec.anchored(folder)) if isinstance(stage, Shaking) else stage

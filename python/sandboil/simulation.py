@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from . import _core
-from ._errors import InvalidInput, SandboilError, nearest_name
+from ._errors import InvalidInput, SandboilError, SandboilWarning, nearest_name
+from .boundaries import Periodic
 from .discretise import Discretisation, Floats, discretise
 from .motion import Motion
 from .scene import Gravity, Region, Scene, Shaking
@@ -19,6 +21,11 @@ LOOK_INTERVAL = 0.1
 
 # Most threads: beyond, no section has work enough, and starting them takes longer than a run.
 MAX_THREADS = 256
+
+# Velocity at the end of a motion over its peak beyond which it is told. The ground is then stopped within a
+# sample, by a wave of stress rho Vs v: up to this share it is lost in what the shaking itself does. Records
+# that were baseline corrected end far below.
+RESIDUAL_VELOCITY = 0.02
 
 # More steps than any stage makes; the core counts in 64 bits.
 _NO_LIMIT = 2**62
@@ -110,10 +117,10 @@ class Probe:
 
 def probes_of(scene: Scene, particles: Discretisation) -> list[Probe]:
     """Where the histories of a scene are taken: surface, base and depths in the mid column, then points."""
-    x0, y0, x1, _ = scene.bounds
+    x0, _, x1, _ = scene.bounds
     x = 0.5 * (x0 + x1)
     surface = float(particles.overburden.surface_elevation(np.array([x]))[0])
-    column = [("surface", surface), ("base", y0)]
+    column = [("surface", surface), ("base", scene.outline.base_elevation(x))]
     column += [(f"depth {depth:g} m", surface - depth) for depth in scene.output.depths]
     points = [(f"point ({px:g}, {py:g}) m", px, py) for px, py in scene.output.points]
     return [*(Probe(label, x, y) for label, y in column), *(Probe(*point) for point in points)]
@@ -134,7 +141,8 @@ class Simulation:
     scene : as given
     particles : the nodes and their geostatic state
     probes : where histories are taken
-    motions : the motion of every stage, None where there is none
+    motions : the motion of every stage, None where there is none; horizontal, and for all of the base
+    doubts : why an answer may not be what was meant; each is also warned of as :class:`SandboilWarning`
 
     Raises
     ------
@@ -148,11 +156,13 @@ class Simulation:
         self.scene = scene
         self.particles = discretise(scene)
         self.probes = probes_of(scene, self.particles)
-        self.motions, waves = _motions(scene)
-        self._waves = [None if wave is None else (wave[0], np.ascontiguousarray(wave[1])) for wave in waves]
-        self._durations = [
-            stage.resolved_duration if isinstance(stage, Shaking) else None for stage in scene.stages
-        ]
+        loaded = loaded_motions(scene)
+        self.motions = [None if motions is None else motions.main for motions in loaded]
+        self._durations = [scene.duration(stage) for stage in scene.stages]
+        self._waves = [None if motions is None else motions.waves() for motions in loaded]
+        self.doubts = doubts(scene, loaded)
+        for doubt in self.doubts:
+            warnings.warn(doubt, SandboilWarning, stacklevel=2)
         self._core = _core.Simulation(_description(scene, self.particles), threads)
         self._index = -1
         self._begin_next_stage()
@@ -246,28 +256,10 @@ class Simulation:
         if isinstance(stage, Gravity):
             self._core.begin_gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
             return
-        scene, output = self.scene, self.scene.output
-        base, rayleigh, wave = stage.base, stage.rayleigh, self._waves[self._index]
-        self._core.begin_shaking(
-            {
-                "duration": self.duration,
-                "waves": [] if wave is None else [(*wave, None)],
-                "base": {
-                    "vertical": "roller",
-                    "half_space": None if base.Vs is None else (base.Vs, None, base.density),
-                    "segments": [(-math.inf, math.inf, None if wave is None else 0, 0.0, 0.0)],
-                },
-                "sides": ("wall", "wall"),
-                "local_damping": scene.numerics.local_damping,
-                "rayleigh": None if rayleigh is None else (rayleigh.ratio, rayleigh.frequencies),
-                "time_step_factor": scene.numerics.time_step_factor,
-                "probes": np.array([(probe.x, probe.y) for probe in self.probes]),
-                "history_interval": output.history_dt,
-                "stress_histories": output.stress_paths,
-                "pressure_envelope": "r_u" in output.envelopes,
-                "strain_envelope": "gamma_max" in output.envelopes,
-            }
-        )
+        duration, waves = self.duration, self._waves[self._index]
+        assert duration is not None
+        assert waves is not None
+        self._core.begin_shaking(_shaking_description(self.scene, stage, duration, waves, self.probes))
 
     # Reading
 
@@ -387,21 +379,111 @@ def pore_pressure_ratio(pressure: Floats, sigma_v_eff0: Floats) -> Floats:
     return ratio
 
 
-def _motions(scene: Scene) -> tuple[list[Motion | None], list[tuple[float, Floats] | None]]:
-    """The motion of every stage and its upgoing wave; what is wrong with one is told with its stage."""
-    motions: list[Motion | None] = []
-    waves: list[tuple[float, Floats] | None] = []
-    for i, stage in enumerate(scene.stages):
-        spec = stage.motion if isinstance(stage, Shaking) else None
+# Spacing of a wave's samples, s, and its horizontal and vertical velocities, m/s.
+Wave = tuple[float, Floats, Floats | None]
+
+
+@dataclass(frozen=True)
+class StageMotions:
+    """The motions of a shaking stage, read.
+
+    Attributes
+    ----------
+    places : (place in the stage, motion) of each
+    main : the stage's own; None if it has none
+    vertical : its vertical component, if any
+    segments : one for each stretch of the base from left to right; None: that of the stage
+    """
+
+    places: list[tuple[str, Motion]]
+    main: Motion | None
+    vertical: Motion | None
+    segments: list[Motion | None]
+
+    def waves(self) -> tuple[list[Wave], list[int | None]]:
+        """The upgoing waves, and the index of that of each stretch; None where nothing comes."""
+        waves: list[Wave] = []
+        upgoing = [
+            None if motion is None else motion.upgoing_velocity() for motion in (self.main, self.vertical)
+        ]
+        horizontal, vertical = (None if wave is None else np.ascontiguousarray(wave[1]) for wave in upgoing)
+        dt = next((wave[0] for wave in upgoing if wave is not None), None)
+        if dt is not None:
+            waves.append((dt, np.zeros(1) if horizontal is None else horizontal, vertical))
+        of_stage = len(waves) - 1 if waves else None
+        indices: list[int | None] = []
+        for motion in self.segments:
+            if motion is None:
+                indices.append(of_stage)
+            else:
+                own, velocity = motion.upgoing_velocity()
+                indices.append(len(waves))
+                waves.append((own, np.ascontiguousarray(velocity), None))
+        return waves, indices
+
+
+def loaded_motions(scene: Scene) -> list[StageMotions | None]:
+    """The motions of every shaking stage; what is wrong with one is told with its stage."""
+    return [
+        _stage_motions(scene, stage, f"scene.stages[{i}].") if isinstance(stage, Shaking) else None
+        for i, stage in enumerate(scene.stages)
+    ]
+
+
+def _stage_motions(scene: Scene, stage: Shaking, path: str) -> StageMotions:
+    loaded: dict[str, Motion] = {}
+    for place, spec in stage.motions:
+        if spec is None:
+            continue
         try:
-            motions.append(None if spec is None else spec.load())
-            motion = motions[-1]
-            waves.append(None if motion is None else motion.upgoing_velocity())
+            loaded[place] = spec.load()
+            loaded[place].upgoing_velocity()
         except InvalidInput as error:
             # A file's own place, line and all, follows the stage's.
-            path = error.path if error.path.startswith("motion") else f"motion, {error.path}"
-            raise InvalidInput(f"scene.stages[{i}].{path}", error.value, error.allowed, error.hint) from None
-    return motions, waves
+            rest = error.path.removeprefix("motion")
+            told = rest if rest != error.path else f", {error.path}"
+            raise InvalidInput(f"{path}{place}{told}", error.value, error.allowed, error.hint) from None
+    main, vertical = loaded.get("motion"), loaded.get("vertical")
+    if main is not None and vertical is not None and not math.isclose(main.dt, vertical.dt):
+        raise InvalidInput(
+            f"{path}vertical.dt",
+            vertical.dt,
+            f"must be that of the horizontal motion, {main.dt:g} s",
+            "take both components of the same record",
+        )
+    of_spec = {id(spec): loaded[place] for place, spec in stage.motions if spec is not None}
+    segments = [
+        None if arrival.motion is None else of_spec[id(arrival.motion)] for arrival in scene.arrivals(stage)
+    ]
+    return StageMotions(list(loaded.items()), main, vertical, segments)
+
+
+def doubts(scene: Scene, loaded: list[StageMotions | None]) -> list[str]:
+    """Why a scene's shaking may not be what was meant; empty if there is no reason known."""
+    told = []
+    for i, (stage, motions) in enumerate(zip(scene.stages, loaded, strict=True)):
+        if not isinstance(stage, Shaking) or motions is None:
+            continue
+        path = f"scene.stages[{i}]"
+        for place, motion in motions.places:
+            left = float(motion.velocity[-1])
+            if abs(left) > RESIDUAL_VELOCITY * motion.pgv:
+                told.append(
+                    f"{path}.{place} ends with a velocity of {left:.3g} m/s, {abs(left) / motion.pgv:.0%} of "
+                    f"its peak, and a drift of {motion.displacement[-1]:.3g} m: the ground is stopped with a "
+                    "blow and stays displaced; motion.baseline_corrected() takes both away"
+                )
+        for arrival, own in zip(scene.arrivals(stage), motions.segments, strict=True):
+            passing = own or motions.main or motions.vertical
+            if stage.duration is None or passing is None or arrival.latest == 0.0:
+                continue
+            end = arrival.latest + passing.duration
+            if end > stage.duration + passing.dt:
+                told.append(
+                    f"{path}.duration = {stage.duration:g} s ends before the motion has passed the base from "
+                    f"x = {arrival.x[0]:g} to {arrival.x[1]:g} m, which takes {end:.4g} s"
+                )
+    return told
 
 
 def stress_node_positions(particles: Discretisation) -> Floats:
@@ -413,7 +495,7 @@ def stress_node_positions(particles: Discretisation) -> Floats:
 
 def _description(scene: Scene, particles: Discretisation) -> dict[str, Any]:
     """The scene as the numerical core takes it."""
-    x0, x1, y0, _ = particles.bounds
+    x0, x1, _, _ = particles.bounds
     sigma_v_eff, _ = particles.stress_at(stress_node_positions(particles).reshape(-1, 2))
     water = scene.water
     numerics = scene.numerics.model_dump(exclude={"local_damping", "time_step_factor"})
@@ -428,19 +510,75 @@ def _description(scene: Scene, particles: Discretisation) -> dict[str, Any]:
         "pore_pressure": np.empty(0) if water is None else particles.pore_pressure0,
         "water": None if water is None else (water.unit_weight, water.bulk_modulus),
         "gravity": scene.gravity,
-        "period": x1 - x0,
-        "base": np.array([(x0, y0), (x1, y0)]),
-        "base_support": "no-slip",
-        "left": None,
-        "right": None,
+        "period": x1 - x0 if isinstance(scene.sides, Periodic) else None,
+        **_edges(scene),
         "numerics": numerics,
     }
 
 
+def _edges(scene: Scene) -> dict[str, Any]:
+    """Base and sides as the numerical core takes them, and what they are in statics."""
+    outline, (x0, _, x1, _) = scene.outline, scene.bounds
+    left, right = (
+        _side(kind, x, extent)
+        for kind, x, extent in zip(scene.side_kinds, (x0, x1), (outline.left, outline.right), strict=True)
+    )
+    return {
+        "base": outline.base,
+        "base_support": _gravity(scene).base,
+        "left": left,
+        "right": right,
+    }
+
+
+def _side(kind: str, x: float, extent: tuple[float, float]) -> dict[str, Any] | None:
+    """A side as a wall of the static stage; None between periodic sides."""
+    if kind == "periodic":
+        return None
+    support = "fixed" if kind == "fixed" else "roller"
+    return {"x": x, "bottom": extent[0], "top": extent[1], "support": support}
+
+
+def _shaking_description(
+    scene: Scene,
+    stage: Shaking,
+    duration: float,
+    waves: tuple[list[Wave], list[int | None]],
+    probes: list[Probe],
+) -> dict[str, Any]:
+    """A shaking stage as the numerical core takes it."""
+    base, rayleigh, output = stage.base, stage.rayleigh, scene.output
+    left, right = ("free-field" if kind == "free-field" else "wall" for kind in scene.side_kinds)
+    return {
+        "duration": duration,
+        "waves": waves[0],
+        "base": {
+            "vertical": stage.base_vertical,
+            "half_space": None if base.Vs is None else (base.Vs, base.Vp, base.density),
+            "segments": [
+                (*arrival.x, wave, arrival.delay, arrival.slowness)
+                for arrival, wave in zip(scene.arrivals(stage), waves[1], strict=True)
+            ],
+        },
+        "sides": (left, right),
+        "local_damping": scene.numerics.local_damping,
+        "rayleigh": None if rayleigh is None else (rayleigh.ratio, rayleigh.frequencies),
+        "time_step_factor": scene.numerics.time_step_factor,
+        "probes": np.array([(probe.x, probe.y) for probe in probes]),
+        "history_interval": output.history_dt,
+        "stress_histories": output.stress_paths,
+        "pressure_envelope": "r_u" in output.envelopes,
+        "strain_envelope": "gamma_max" in output.envelopes,
+    }
+
+
+def _gravity(scene: Scene) -> Gravity:
+    return next(stage for stage in scene.stages if isinstance(stage, Gravity))
+
+
 def _region(scene: Scene, region: Region) -> dict[str, Any]:
     soil = region.resolved(scene)
-    gravity = next(stage for stage in scene.stages if isinstance(stage, Gravity))
-    poisson = gravity.initial_poisson_ratio
+    poisson = _gravity(scene).initial_poisson_ratio
     return {
         "material": region.material.core(),
         "porosity": soil.porosity,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
-from .._errors import InvalidInput, nearest_name
+from .._errors import InvalidInput, SandboilWarning, nearest_name
 from .._model import Number
 from ..materials import PM4Sand
 from . import correlations
@@ -44,7 +44,7 @@ _MET = 0.01
 _STEP = 0.0025
 
 
-class CalibrationWarning(UserWarning):
+class CalibrationWarning(SandboilWarning):
     """The target of a calibration cannot be met; the nearest sand was returned."""
 
 

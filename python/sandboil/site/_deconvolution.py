@@ -15,7 +15,7 @@ import numpy.typing as npt
 from pydantic import Field, PlainValidator, StrictBool
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from .._errors import InvalidInput
+from .._errors import InvalidInput, SandboilWarning
 from .._model import Number, checked
 from ..materials import Positive
 from ..motion import Motion
@@ -45,7 +45,7 @@ AMPLIFICATION_LIMIT = 3.0
 LOST_LIMIT = 0.01
 
 
-class DeconvolutionWarning(UserWarning):
+class DeconvolutionWarning(SandboilWarning):
     """A deconvolved motion is doubtful."""
 
 

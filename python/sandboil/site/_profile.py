@@ -13,9 +13,10 @@ from pydantic.config import JsonDict
 from .. import _core, lab
 from .._errors import InvalidInput
 from .._model import Many, Model, Number, checked
+from ..boundaries import COORDINATE_TOLERANCE, CompliantBase
 from ..discretise import Floats, discretise
 from ..materials import Elastic, Material, NonNegative, Positive, PressureElastic
-from ..scene import COORDINATE_TOLERANCE, DEFAULT_LAYER, CompliantBase, Scene, Shaking
+from ..scene import DEFAULT_LAYER, Scene, Shaking
 
 # Most layers of a profile: the waves of a long record in them fill about 2 GB.
 MAX_LAYERS = 1000
@@ -250,7 +251,7 @@ def profile(
         half_space = HalfSpace(base.density * scene.gravity, base.Vs)
     else:
         lowest = column[-1]
-        foot = np.array([[across[lowest], up[lowest] - 0.5 * dy]])
+        foot = np.array([[across[lowest], scene.outline.base_elevation(float(across[lowest]))]])
         sigma_v = float(particles.stress_at(foot)[0][0])
         half_space = HalfSpace(*_small_strain(scene, int(particles.region[lowest]), sigma_v))
     return SiteProfile(layers, half_space=half_space)

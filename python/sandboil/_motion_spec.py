@@ -1,0 +1,121 @@
+"""Where a ground motion comes from, as a scene writes it down."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+
+from ._errors import InvalidInput, nearest_name
+from ._model import Many, Model, Number
+from .materials import Positive
+
+if TYPE_CHECKING:
+    from .motion import Motion
+
+
+class MotionSpec(Model):
+    """Where a ground motion comes from, so that a scene can be written down.
+
+    Exactly one source: `file` (PEER .AT2, or a CSV with its `unit` and `column` unless its header tells),
+    `synthetic` or `ricker` (arguments of the :class:`Motion` constructors of those names), or `dt` with
+    `acceleration_g` or `velocity` (m/s). `scale` multiplies the motion.
+    """
+
+    _label: ClassVar[str] = "motion"
+
+    file: str | None = Field(default=None, description="path, relative to the scene's file")
+    unit: str | None = Field(default=None, description="unit of a CSV's values")
+    column: Annotated[int, Field(strict=True, ge=0)] | str | None = None
+    synthetic: dict[str, int | Number] | None = None
+    ricker: dict[str, int | Number] | None = None
+    dt: Positive | None = Field(default=None, description="time between samples, s")
+    acceleration_g: Many[Number] | None = None
+    velocity: Many[Number] | None = Field(default=None, description="m/s")
+    kind: Literal["outcrop", "within", "upgoing"] = "outcrop"
+    scale: Number | None = None
+
+    @field_validator("synthetic", "ricker")
+    @classmethod
+    def _complete(cls, said: dict[str, float] | None, field: ValidationInfo) -> dict[str, float] | None:
+        """Check the generator's arguments and write its defaults out: the scene then keeps its meaning."""
+        if said is None:
+            return None
+        from .motion import Motion
+
+        generator = str(field.field_name)
+        known = dict(inspect.signature(getattr(Motion, generator)).parameters)
+        known.pop("kind", None)
+        for name, value in said.items():
+            if name not in known:
+                meant = nearest_name(name, known)
+                raise InvalidInput(
+                    f"{generator}.{name}",
+                    value,
+                    f"unknown key, known are {', '.join(known)}",
+                    f"did you mean {meant!r}?" if meant else None,
+                )
+        for name, parameter in known.items():
+            if parameter.default is inspect.Parameter.empty and name not in said:
+                raise InvalidInput(f"{generator}.{name}", None, "is required")
+        defaults = {name: parameter.default for name, parameter in known.items()}
+        complete = defaults | said
+        return {name: complete[name] for name in known if complete[name] is not None}
+
+    @model_validator(mode="after")
+    def _one_source(self) -> MotionSpec:
+        sources = ("file", "synthetic", "ricker", "acceleration_g", "velocity")
+        given = [name for name in sources if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise InvalidInput("motion", given, f"must have exactly one source of {', '.join(sources)}")
+        source = given[0]
+        if (self.dt is not None) != (source in ("acceleration_g", "velocity")):
+            raise InvalidInput("motion.dt", self.dt, "goes with acceleration_g or velocity, and they with it")
+        return self
+
+    @classmethod
+    def of(cls, motion: Motion) -> MotionSpec:
+        """How to write `motion` down: by its source if it is unchanged since, else by its samples."""
+        if motion.source is None:
+            samples: dict[str, Any] = {motion.quantity: getattr(motion, motion.quantity)}
+            return cls(dt=motion.dt, kind=motion.kind, **samples)
+        source = dict(motion.source)
+        if "file" in source:
+            # Said relative to the working folder; a scene's file may be written anywhere.
+            source["file"] = str(Path(source["file"]).absolute())
+        return cls(**source)
+
+    def load(self) -> Motion:
+        """The motion itself; :class:`InvalidInput` if its file or its numbers are no motion."""
+        from .motion import Motion
+
+        if self.file is not None:
+            motion = Motion.from_file(self.file, unit=self.unit, column=self.column, kind=self.kind)
+        elif self.synthetic is not None:
+            motion = Motion.synthetic(**dict[str, Any](self.synthetic), kind=self.kind)
+        elif self.ricker is not None:
+            motion = Motion.ricker(**dict[str, Any](self.ricker), kind=self.kind)
+        else:
+            samples: dict[str, Any] = self.model_dump(include={"dt", "acceleration_g", "velocity", "kind"})
+            motion = Motion(**samples)
+        return motion if self.scale is None else motion.scaled(factor=self.scale)
+
+    def anchored(self, folder: Path) -> MotionSpec:
+        """The same with its file found from `folder`."""
+        if self.file is None:
+            return self
+        return self.model_copy(update={"file": str(folder.absolute() / self.file)})
+
+
+def _said(value: object) -> object:
+    if value is None or isinstance(value, (dict, MotionSpec)):
+        return value
+    from .motion import Motion
+
+    return MotionSpec.of(value) if isinstance(value, Motion) else value
+
+
+GivenMotion = Annotated[MotionSpec | None, BeforeValidator(_said)]
+"""A motion itself, or how it is written down, or none."""
