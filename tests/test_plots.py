@@ -9,8 +9,8 @@ import pytest
 import scenes
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from sandboil import Gravity, InvalidInput, Run, run
-from sandboil.plots import Reference, column, plot, pore_pressure, stress_paths, surface
+from sandboil import FreeField, Gravity, InvalidInput, Output, Region, Run, polygon, run
+from sandboil.plots import Reference, column, plot, pore_pressure, section, stress_paths, surface
 
 PNG = b"\x89PNG"
 
@@ -69,6 +69,20 @@ def test_pictures_lie_in_the_folder_of_the_run_by_default(tmp_path: Path) -> Non
     assert {path.parent for path in paths} == {tmp_path / "plots"}
     # Without water there is no pore pressure to draw.
     assert [path.name for path in paths] == ["surface.png", "column.png", "stress_paths.png"]
+
+
+def test_a_slope_is_drawn_as_a_section(tmp_path: Path) -> None:
+    bank = polygon([(0, 0), (8, 0), (8, 2), (6, 2), (2, 4), (0, 4)])
+    ground = Region("ground", bank, scenes.ROCK, dry_unit_weight=20.0)
+    results = run(
+        scenes.dry_column(regions=[ground], sides=FreeField(), output=Output(depths=[1.0])), tmp_path
+    )
+    assert "section.png" in [path.name for path in plot(results)]
+    (axes, _) = section(results).axes
+    edge = next(line for line in axes.get_lines() if line.get_label() == "at rest")
+    np.testing.assert_array_equal(edge.get_ydata(), [0, 0, 2, 2, 4, 4, 0])
+    # The mid column ends where the slope does, not where the section does.
+    assert column(results).axes[-1].get_ylim()[0] == 3.0
 
 
 def test_every_axis_says_what_it_shows(finished: Run) -> None:

@@ -4,19 +4,21 @@ and kept its results, 130 interrupted."""
 from __future__ import annotations
 
 import sys
+import warnings
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from . import _cli_lab
-from ._errors import InvalidInput, RunInterrupted, SandboilError
+from ._errors import InvalidInput, RunInterrupted, SandboilError, SandboilWarning
 from .motion import Kind, Motion
 from .plan import plan as plan_of
 from .results import FILE_NAME, load
 from .run import Accuracy
 from .run import run as run_scene
 from .scene import Scene
+from .simulation import doubts, loaded_motions
 from .site import CurveChoice, Place, deconvolution
 
 EXIT_INVALID = 2
@@ -87,10 +89,14 @@ def run(
     threads: ThreadsOption = 2,
 ) -> None:
     """Compute a scene. Ctrl-C ends it with readable results."""
+    said = _scene(scene, motion, unit, column, kind)
+    for doubt in doubts(said, loaded_motions(said)):
+        typer.echo(f"warning: {doubt}", err=True)
     try:
-        results = run_scene(
-            _scene(scene, motion, unit, column, kind), out, threads=threads, accuracy=accuracy
-        )
+        with warnings.catch_warnings():
+            # They are told above, before the run's long time.
+            warnings.simplefilter("ignore", SandboilWarning)
+            results = run_scene(said, out, threads=threads, accuracy=accuracy)
     except InvalidInput:
         raise
     except SandboilError as error:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import time
+import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from . import _core
+from ._errors import SandboilWarning
+from ._motion_spec import MotionSpec
 from .discretise import discretise
 from .motion import Motion
 from .motion._motion import SIGNIFICANT
-from .scene import Gravity, Scene
-from .simulation import LOOK_INTERVAL, Simulation
+from .scene import Gravity, Scene, Shaking
+from .simulation import LOOK_INTERVAL, Simulation, doubts, loaded_motions
 
 # Wall time for which each stage is tried, s: long enough for thousands of steps of a column.
 TRIAL_SECONDS = 1.5
@@ -66,6 +70,7 @@ class Plan:
     arrays : bytes of the core's arrays by name, in the last stage
     file_size : fields and histories in the results before compression, bytes
     pore_pressure_coefficients : Skempton's B of each region, the lowest in it; empty without water
+    doubts : why the answer may not be what was meant, of which a run warns
     """
 
     nodes: int
@@ -79,6 +84,7 @@ class Plan:
     arrays: dict[str, int]
     file_size: int
     pore_pressure_coefficients: dict[str, float]
+    doubts: list[str]
 
     @property
     def wall_time(self) -> float | None:
@@ -116,6 +122,8 @@ class Plan:
             f"accuracy      {self.accuracy}; what presets save and cost is measured on the level ground,",
             "              see docs/validation.md",
         ]
+        if self.doubts:
+            lines += ["", *(f"warning: {doubt}" for doubt in self.doubts)]
         return "\n".join(lines)
 
 
@@ -180,7 +188,11 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
     from .run import with_accuracy
 
     scene = with_accuracy(scene, accuracy)
-    simulation = Simulation(_from_strong_part(scene), threads)
+    told = doubts(scene, loaded_motions(scene))
+    with warnings.catch_warnings():
+        # Those of the scene itself are on the page; these are of its motions cut.
+        warnings.simplefilter("ignore", SandboilWarning)
+        simulation = Simulation(_from_strong_part(scene), threads)
     stages = []
     for index, stage in enumerate(scene.stages):
         if index > 0:
@@ -220,6 +232,7 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
         arrays=simulation.arrays(),
         file_size=_file_size(scene, simulation, stages),
         pore_pressure_coefficients=pore_pressure_coefficients(scene),
+        doubts=told,
     )
 
 
@@ -237,14 +250,32 @@ def _physics(scene: Scene, simulation: Simulation) -> list[tuple[str, bool, str]
 
 def _from_strong_part(scene: Scene) -> Scene:
     """The scene with its motions cut to begin where strong shaking does: a quiet start would tell nothing."""
-    for stage in scene.stages:
-        if isinstance(stage, Gravity) or stage.motion is None:
-            continue
-        motion = stage.motion.load()
-        intensity = np.cumsum(motion.acceleration_g**2)
-        begin = min(int(np.searchsorted(intensity, SIGNIFICANT[0] * intensity[-1])), len(intensity) - 2)
-        return scene.with_motion(Motion(dt=motion.dt, velocity=motion.velocity[begin:], kind=motion.kind))
-    return scene
+    stages = [
+        stage.with_motions(_cut_at(_strong_time(stage))) if isinstance(stage, Shaking) else stage
+        for stage in scene.stages
+    ]
+    return scene.model_copy(update={"stages": tuple(stages)})
+
+
+def _strong_time(stage: Shaking) -> float:
+    """When strong shaking begins in the first motion of a stage, s; 0 without one."""
+    spec = next((spec for _, spec in stage.motions if spec is not None), None)
+    if spec is None:
+        return 0.0
+    motion = spec.load()
+    intensity = np.cumsum(motion.acceleration_g**2)
+    return float(motion.time[np.searchsorted(intensity, SIGNIFICANT[0] * intensity[-1])])
+
+
+def _cut_at(begin: float) -> Callable[[MotionSpec], MotionSpec]:
+    """What takes the first `begin` s from a motion, and leaves two samples at least."""
+
+    def cut(spec: MotionSpec) -> MotionSpec:
+        motion = spec.load()
+        first = min(round(begin / motion.dt), len(motion.time) - 2)
+        return MotionSpec.of(Motion(dt=motion.dt, velocity=motion.velocity[first:], kind=motion.kind))
+
+    return cut
 
 
 def _file_size(scene: Scene, simulation: Simulation, stages: list[StagePlan]) -> int:

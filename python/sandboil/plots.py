@@ -96,6 +96,8 @@ def plot(
         if run.scene.water is not None and run.scene.output.depths:
             figures["pore_pressure"] = pore_pressure(run, reference=reference, stage=stage)
         figures["column"] = column(run, stage=stage)
+        if not run.scene.outline.is_level:
+            figures["section"] = section(run, stage=stage)
         if run.scene.output.stress_paths and run.scene.output.depths:
             figures["stress_paths"] = stress_paths(run, reference=reference, stage=stage)
         target = run.path.parent / FOLDER if folder is None else Path(folder)
@@ -212,6 +214,28 @@ def column(run: Run, *, stage: str | None = None) -> Figure:
     return figure
 
 
+def section(run: Run, *, stage: str | None = None) -> Figure:
+    """The section where its soil went: outline at rest, and displacement of every particle at the end."""
+    stage = _shaken_stage(run, stage)
+    outline, (x0, y0, x1, y1) = run.scene.outline, run.scene.bounds
+    displacement = run.field("displacement", stage=stage)
+    moved = run.position + displacement
+    width = 10.0
+    height = float(np.clip(width * (y1 - y0) / (x1 - x0), 2.0, width))
+    figure = Figure(figsize=(width, height + 1.0), layout="constrained")
+    axes = figure.subplots()
+    edge = np.vstack([outline.base, outline.surface[::-1], outline.base[:1]])
+    size = 100.0 * np.hypot(displacement[:, 0], displacement[:, 1])
+    image = axes.scatter(moved[:, 0], moved[:, 1], c=size, s=6.0, cmap="viridis", linewidths=0.0)
+    figure.colorbar(image, ax=axes, label="displacement, cm")
+    axes.plot(*edge.T, color="black", lw=0.8, label="at rest")
+    axes.plot(*np.array([(p.x, p.y) for p in run.probes]).T, "k+", ms=6.0, label="histories")
+    axes.set(xlabel="x, m", ylabel="y, m", aspect="equal")
+    axes.set_title(f"displacement at {run.frame_times(stage)[-1]:.4g} s", loc="left", fontsize=9)
+    axes.legend(loc="upper right", fontsize=7)
+    return figure
+
+
 def _draw_map(run: Run, stage: str, times: Floats, axes: Axes) -> None:
     profile = run.profile("sigma_v_eff", stage=stage)
     nodes = run.column(profile.x)
@@ -222,8 +246,7 @@ def _draw_map(run: Run, stage: str, times: Floats, axes: Axes) -> None:
     axes.figure.colorbar(image, ax=axes, label="$r_u$", extend="max")
     for below in run.scene.output.depths:
         axes.axhline(below, color="white", lw=0.6, ls=":")
-    _, bottom, _, top = run.scene.bounds
-    axes.set(xlabel="time, s", ylabel="depth below the surface, m", ylim=(top - bottom, 0.0))
+    axes.set(xlabel="time, s", ylabel="depth below the surface, m", ylim=(_thickness(run), 0.0))
     axes.set_xlim(times[0], times[-1])
     axes.set_title(f"excess pore pressure ratio at x = {profile.x:g} m", loc="left", fontsize=9)
     axes.grid(visible=False)
@@ -248,10 +271,15 @@ def _draw_sway(run: Run, stage: str, times: Floats, axes: Axes) -> None:
         # A centimetre of sway takes as much paper as `factor` centimetres of depth.
         axes.set_aspect(100.0 / factor)
         axes.set_title(f"sway, drawn {factor:g} times larger", loc="left", fontsize=9)
-    _, bottom, _, top = run.scene.bounds
     label = "depth below the surface, m"
-    axes.set(xlabel="displacement against the base, cm", ylabel=label, ylim=(top - bottom, 0.0))
+    axes.set(xlabel="displacement against the base, cm", ylabel=label, ylim=(_thickness(run), 0.0))
     axes.legend(loc="lower left", fontsize=7, title="time", title_fontsize=7)
+
+
+def _thickness(run: Run) -> float:
+    """Of the mid column, m: from the surface's history to the base's."""
+    surface, base = run.probes[:2]
+    return surface.y - base.y
 
 
 def _strong_part(motion: Motion | None, times: Floats) -> tuple[float, float]:
