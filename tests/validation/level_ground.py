@@ -54,9 +54,10 @@ def scene(
     spacing: float = 0.2,
     width: float | None = None,
     rayleigh: sb.Rayleigh | None = None,
+    sides: sb.Periodic | sb.FreeField | None = None,
     **numerics: Any,
 ) -> sb.Scene:
-    """The site as a column `width` wide (one particle if not given), shaken for 40 s."""
+    """The site `width` wide (one particle if not given), periodic unless told, shaken for 40 s."""
     return sb.Scene(
         spacing=spacing,
         water=sb.Water(unit_weight=10.0, bulk_modulus=1.0e6),
@@ -67,6 +68,7 @@ def scene(
             )
             for name, y, sand in LAYERS
         ],
+        sides=sides or sb.Periodic(),
         stages=[sb.Gravity(), sb.Shaking(motion, duration=DURATION, rayleigh=rayleigh)],
         output=sb.Output(depths=DEPTHS, history_dt=0.005, field_dt=1.0),
         numerics=sb.Numerics(**numerics),
