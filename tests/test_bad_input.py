@@ -324,6 +324,13 @@ CASES: dict[str, tuple[Change, str, object, str, str | None]] = {
         "no effect",
         "conservative",
     ),
+    "inertia that does not suit the printed operators": (
+        setting("numerics", {"operators": "printed", "dispersion_correction": True}),
+        "scene.numerics.dispersion_correction",
+        True,
+        "not for the printed operators",
+        "conservative",
+    ),
     "misspelt material": (
         setting(f"{SAND}.kind", "pm4snd"),
         "scene.regions[0].material.kind",

@@ -118,6 +118,20 @@ def test_damping_that_is_not_asked_for_is_not_computed() -> None:
     assert damped.dt < plain.dt
 
 
+def test_inertia_is_corrected_only_while_shaking_and_only_if_asked_for() -> None:
+    plain = at_the_end(elastic_column())
+    assert "inertia_correction" not in plain.arrays()
+    assert plain.counters()["inertia_corrections"] == 0
+    corrected = Simulation(elastic_column(numerics=Numerics(dispersion_correction=True)), threads=1)
+    corrected.run_stage()
+    assert "inertia_correction" not in corrected.arrays()
+    assert corrected.counters()["inertia_corrections"] == 0
+    corrected.run_stage()
+    assert corrected.arrays()["inertia_correction"] > 0
+    assert corrected.counters()["inertia_corrections"] == corrected.steps
+    assert corrected.dt < plain.dt
+
+
 def test_small_strain_builds_the_geometry_once_per_wall() -> None:
     """The particle lists are built for the fixed base and the compliant one, then only as soil moves."""
     weak = scenes.PULSE.scaled(pga_g=0.001)

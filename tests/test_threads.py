@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scenes
-from sandboil import Gravity, Output, Rayleigh, Region, Shaking, Simulation, box
+from sandboil import Gravity, Numerics, Output, Rayleigh, Region, Shaking, Simulation, box
 
 # Loops over fewer rows than this run on one thread (sandboil-solver, parallel.rs).
 FEWEST_THREADED_ROWS = 256
 
 
-def computed(threads: int) -> tuple[dict[str, np.ndarray], np.ndarray, dict[str, np.ndarray], dict[str, int]]:
+def computed(
+    threads: int, corrected: bool
+) -> tuple[dict[str, np.ndarray], np.ndarray, dict[str, np.ndarray], dict[str, int]]:
     """Fields, history times, histories and counters of ground that liquefies."""
     ground = scenes.column(
         regions=[
@@ -23,6 +25,7 @@ def computed(threads: int) -> tuple[dict[str, np.ndarray], np.ndarray, dict[str,
             Shaking(scenes.PULSE, duration=0.6, rayleigh=Rayleigh(ratio=0.005, frequencies=(1.0, 10.0))),
         ],
         output=Output(depths=[1.0, 3.0]),
+        numerics=Numerics(dispersion_correction=corrected),
     )
     simulation = Simulation(ground, threads=threads)
     # Every loop, also that over the stress nodes of one region, is long enough for threads.
@@ -36,9 +39,9 @@ def computed(threads: int) -> tuple[dict[str, np.ndarray], np.ndarray, dict[str,
     return fields, *simulation.take_histories(), simulation.counters()
 
 
-@pytest.mark.parametrize("threads", [2, 3])
-def test_threads_give_the_same_bits(threads: int) -> None:
-    one, several = computed(1), computed(threads)
+@pytest.mark.parametrize(("threads", "corrected"), [(2, False), (3, False), (2, True)])
+def test_threads_give_the_same_bits(threads: int, corrected: bool) -> None:
+    one, several = computed(1, corrected), computed(threads, corrected)
     assert one[0]["r_u"].max() > 0.5, "the ground must be shaken hard enough to matter"
     for name, values in one[0].items():
         np.testing.assert_array_equal(several[0][name], values, err_msg=name, strict=True)

@@ -63,6 +63,7 @@ pub fn numerics(dict: &Bound<'_, PyDict>) -> PyResult<solver::Numerics> {
                 ("off", solver::AccelerationTerm::Off),
             ],
         )?,
+        dispersion_correction: get(dict, "dispersion_correction")?,
         geometry_strain_limit: get(dict, "geometry_strain_limit")?,
         integrator: integrator(&text("integrator")?, get(dict, "integrator_tolerance")?, None)?,
     })
@@ -362,6 +363,7 @@ pub fn counted<'py>(py: Python<'py>, counters: &solver::Counters) -> PyResult<Bo
         ("flow_calls", counters.flow_calls),
         ("base_calls", counters.base_calls),
         ("free_field_calls", counters.free_field_calls),
+        ("inertia_corrections", counters.inertia_corrections),
         ("plastic_updates", counters.plastic_updates),
         ("geometry_builds", counters.geometry_builds),
         ("porosity_clips", counters.porosity_clips),

@@ -85,6 +85,8 @@ pub struct Dashpots {
     rate: Vec<f64>,
     before: Vec<f64>,
     traction: Vec<f64>,
+    /// What a unit force of each dashpot adds to accelerations beside those of the trace, 1/Mg, if anything.
+    spread: Option<Csr<Vec2>>,
 }
 
 impl Dashpots {
@@ -111,12 +113,34 @@ impl Dashpots {
                 trace.iter_row(dashpot.point).map(lost).sum()
             })
             .collect();
-        Self { before: vec![0.0; all.len()], traction: vec![0.0; all.len()], rate, trace, all }
+        Self { before: vec![0.0; all.len()], traction: vec![0.0; all.len()], rate, trace, all, spread: None }
     }
 
     /// The dashpots.
     pub fn all(&self) -> &[Dashpot] {
         &self.all
+    }
+
+    /// Weights of the velocity on the edge: rows are points, columns velocity nodes.
+    pub fn trace(&self) -> &Csr<f64> {
+        &self.trace
+    }
+
+    /// Lets a unit force of each dashpot give `nodes` nodes these accelerations (1/Mg) beside those of the trace.
+    pub fn spread_by(&mut self, spread: Csr<Vec2>, nodes: usize) {
+        let transposed = spread.transposed(nodes);
+        for (rate, Dashpot { point, direction, .. }) in self.rate.iter_mut().zip(&self.all) {
+            let lost = |(k, response): (usize, &Vec2)| {
+                let resisting = &self.all[k];
+                let felt = resisting.length * resisting.impedance * resisting.direction.dot(direction);
+                response.dot(direction) * felt
+            };
+            let along = |(node, weight): (usize, &f64)| -> f64 {
+                weight * transposed.iter_row(node).map(lost).sum::<f64>()
+            };
+            *rate += self.trace.iter_row(*point).map(along).sum::<f64>();
+        }
+        self.spread = Some(spread);
     }
 
     /// Mean traction of the last step of each dashpot in its direction, kPa.
@@ -155,10 +179,15 @@ impl Dashpots {
             self.traction[k] =
                 dashpot.impedance * (relaxed * (target(k) - before) - pushed * (moved - before));
         }
-        for (dashpot, traction) in self.all.iter().zip(&self.traction) {
+        for (k, (dashpot, traction)) in self.all.iter().zip(&self.traction).enumerate() {
             let force = dashpot.direction * (traction * dashpot.length);
             for (node, weight) in self.trace.iter_row(dashpot.point) {
                 let pushed = force * (weight / mass[node]);
+                velocity[node] += pushed * dt;
+                acceleration[node] += pushed;
+            }
+            for (node, response) in self.spread.iter().flat_map(|spread| spread.iter_row(k)) {
+                let pushed = response * (traction * dashpot.length);
                 velocity[node] += pushed * dt;
                 acceleration[node] += pushed;
             }
@@ -167,7 +196,8 @@ impl Dashpots {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.trace.bytes() + size_of_val(self.all.as_slice()) + 3 * size_of_val(self.rate.as_slice())
+        let spread = self.spread.as_ref().map_or(0, Csr::bytes);
+        self.trace.bytes() + spread + size_of_val(self.all.as_slice()) + 3 * size_of_val(self.rate.as_slice())
     }
 }
 
@@ -350,6 +380,11 @@ impl CompliantBase {
     /// The dashpots.
     pub fn dashpots(&self) -> &Dashpots {
         &self.dashpots
+    }
+
+    /// See [`Dashpots::spread_by`].
+    pub fn spread_by(&mut self, spread: Csr<Vec2>, nodes: usize) {
+        self.dashpots.spread_by(spread, nodes);
     }
 
     /// See [`Dashpots::begin_step`].

@@ -8,6 +8,7 @@ mod banded;
 pub mod base;
 pub mod boundary;
 mod deformation;
+mod dispersion;
 pub mod error;
 mod flow;
 mod free_field;

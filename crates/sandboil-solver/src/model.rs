@@ -80,6 +80,8 @@ pub struct Numerics {
     pub diffusion: Diffusion,
     /// Acceleration term of Eq. 7.
     pub acceleration_term: AccelerationTerm,
+    /// Whether inertia is corrected for the slowness of short waves (conservative operators only).
+    pub dispersion_correction: bool,
     /// Strain since the last geometry at which lists and weights are rebuilt; none: that of the operators.
     pub geometry_strain_limit: Option<f64>,
     /// Integrator of the sand model.
@@ -191,6 +193,13 @@ impl Model {
         positive("gravity", self.gravity)?;
         positive("smoothing_ratio", self.numerics.smoothing_ratio)?;
         positive("geometry_strain_limit", self.numerics.geometry_strain_limit())?;
+        if self.numerics.dispersion_correction && self.numerics.operators == Operators::Printed {
+            return Err(SolverError::InvalidInput {
+                name: "dispersion_correction",
+                value: 1.0,
+                expected: "left out with the printed operators, whose force is not the transpose of their strain",
+            });
+        }
         if let Some(water) = self.water {
             positive("water.unit_weight", water.unit_weight)?;
             positive("water.bulk_modulus", water.bulk_modulus)?;

@@ -4,6 +4,7 @@ use crate::{
     base::{Base, CompliantBase, Impedance, Vertical},
     boundary::{EdgeNodes, Outline, Walls, base_condition},
     deformation::Deformation,
+    dispersion::Dispersion,
     error::SolverError,
     flow::{Flow, FlowScheme},
     free_field::{FreeField, Section},
@@ -18,7 +19,7 @@ use crate::{
         motion,
     },
     soil_field::SoilField,
-    timestep::{Criterion, PressureCoupling, PressureSpectrum, region_limit},
+    timestep::{CORRECTED_RESPONSE, Criterion, PressureCoupling, PressureSpectrum, region_limit},
 };
 use sandboil_soil::{Stress, UpdateReport};
 use sandboil_sph::Vec2;
@@ -89,6 +90,8 @@ pub struct Counters {
     pub base_calls: u64,
     /// Steps with free-field sides.
     pub free_field_calls: u64,
+    /// Steps with dispersion-corrected inertia.
+    pub inertia_corrections: u64,
     /// Updates of plastic soil models.
     pub plastic_updates: u64,
     /// Geometries built.
@@ -159,6 +162,7 @@ pub struct Simulation {
     flow: Option<Flow>,
     printed_stress: Option<PrintedStress>,
     rayleigh: Option<RayleighDamping>,
+    dispersion: Option<Dispersion>,
     active: Active,
     time: f64,
     step: u64,
@@ -219,6 +223,7 @@ impl Simulation {
             printed_stress: geometry.printed.as_ref().map(|_| PrintedStress::default()),
             geometry,
             rayleigh: None,
+            dispersion: None,
             active: Active::None,
             time: 0.0,
             step: 0,
@@ -245,6 +250,8 @@ impl Simulation {
         self.soil = SoilField::elastic(&self.model, &mut self.points)?;
         self.flow = None;
         self.rayleigh = None;
+        // Statics know no waves.
+        self.dispersion = None;
         let gravity = Vec2::new(0.0, -self.model.gravity);
         self.constant_force = self.mass.iter().map(|mass| gravity * *mass).collect();
         if self.model.water.is_some() {
@@ -289,7 +296,16 @@ impl Simulation {
                 });
             }
         }
+        if self.model.numerics.dispersion_correction && stage.free_field.contains(&true) {
+            return Err(SolverError::InvalidInput {
+                name: "dispersion_correction",
+                value: 1.0,
+                expected: "left out beside free-field sides, whose push does not know of it",
+            });
+        }
         self.rayleigh = stage.rayleigh.map(|law| RayleighDamping::new(law, self.points.len()));
+        let corrected = self.model.numerics.dispersion_correction;
+        self.dispersion = corrected.then(|| Dispersion::new(&self.model, self.points.len()));
         let absorbs = stage.base.vertical == Vertical::Absorbing;
         // Another stage of shaking keeps the columns of the one before.
         let (goes_on, free_field) = match std::mem::replace(&mut self.active, Active::None) {
@@ -315,7 +331,11 @@ impl Simulation {
         }
         let impedance = self.base_impedance(&stage.base)?;
         let edges = (&self.edges, self.position.as_slice());
-        let base = CompliantBase::new(&self.model, edges, &self.mass, impedance, &stage.base);
+        let mut base = CompliantBase::new(&self.model, edges, &self.mass, impedance, &stage.base);
+        if let Some(dispersion) = &self.dispersion {
+            let spread = dispersion.spread(&self.geometry, &self.points, &self.mass, base.dashpots());
+            base.spread_by(spread, self.model.nodes());
+        }
         let outline = self.present_outline();
         let section = self.section(&outline);
         let free_field = match free_field {
@@ -557,6 +577,7 @@ impl Simulation {
         coupling: PressureCoupling,
         factor: f64,
     ) -> (f64, Criterion) {
+        let response = if self.dispersion.is_some() { CORRECTED_RESPONSE } else { 1.0 };
         let mut stiffest = vec![0.0_f64; self.model.regions.len()];
         for (s, point) in self.points.iter().enumerate() {
             let slot = &mut stiffest[self.model.region[s / STRESS_NODES] as usize];
@@ -567,7 +588,7 @@ impl Simulation {
             .enumerate()
             .filter(|(_, stiffness)| **stiffness > 0.0)
             .map(|(region, &stiffness)| {
-                region_limit(&self.model, region, stiffness, coupling, &self.spectrum, rayleigh)
+                region_limit(&self.model, region, stiffness, coupling, &self.spectrum, rayleigh, response)
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .unwrap_or_default();
@@ -715,15 +736,31 @@ impl Simulation {
         let mut unit = std::mem::take(&mut self.unit);
         let threaded = self.threads > 1;
         let nodes = self.model.nodes();
-        let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: &mut unit };
+        let mut dispersion = self.dispersion.take();
+        // The constant force comes last, so that a state at rest cancels to the last bit.
+        let bare = |this: &Self, j: usize, velocity: Vec2| {
+            (this.internal_force(j, velocity) + this.constant_force[j]) / this.mass[j]
+        };
         let this = &*self;
+        if let Some(dispersion) = &mut dispersion {
+            let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: &mut unit };
+            for_each_chunk(threaded, rows, &mut sums, |first, rows, _| {
+                for (k, (v, a)) in rows.a.iter().zip(rows.b.iter_mut()).enumerate() {
+                    *a = bare(this, first + k, *v);
+                }
+            });
+            dispersion.gather(threaded, &this.geometry, &this.points, &acceleration);
+        }
+        let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: &mut unit };
         for_each_chunk(threaded, rows, &mut sums, |first, rows, sum| {
             *sum = MotionSum::default();
             for (k, (v, a)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
                 let j = first + k;
                 let mass = this.mass[j];
-                // The constant force comes last, so that a state at rest cancels to the last bit.
-                let acting = (this.internal_force(j, *v) + this.constant_force[j]) / mass;
+                let acting = match &dispersion {
+                    None => bare(this, j, *v),
+                    Some(dispersion) => *a + dispersion.acceleration(&this.geometry, j, mass),
+                };
                 *a = acting;
                 *v += acting * dt;
                 let size = acting.norm();
@@ -732,6 +769,8 @@ impl Simulation {
                 sum.largest_acceleration = sum.largest_acceleration.max(size);
             }
         });
+        self.counters.inertia_corrections += u64::from(dispersion.is_some());
+        self.dispersion = dispersion;
         (self.velocity, self.acceleration, self.sums, self.unit) = (velocity, acceleration, sums, unit);
     }
 
@@ -1128,6 +1167,9 @@ impl Simulation {
         }
         if let Some(rayleigh) = &self.rayleigh {
             arrays.push(("viscous_stress", rayleigh.bytes()));
+        }
+        if let Some(dispersion) = &self.dispersion {
+            arrays.push(("inertia_correction", dispersion.bytes()));
         }
         if let Active::Shaking(shaking) = &self.active {
             arrays.push(("base", shaking.base.bytes()));

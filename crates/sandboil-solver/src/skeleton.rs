@@ -82,6 +82,12 @@ pub fn motion(geometry: &Geometry, s: usize, velocity: &[Vec2]) -> Motion {
 }
 
 impl Motion {
+    /// Gradient in the geometry's frame, rows `x` and `y`.
+    #[inline]
+    pub fn gradient(&self) -> (Vec2, Vec2) {
+        (self.x, self.y)
+    }
+
     /// Strain and spin over a step (Eq. 4), and the deformation at its end.
     #[inline]
     pub fn advance(&self, deformation: &mut Deformation, dt: f64) -> StrainIncrement {
@@ -285,6 +291,7 @@ pub(crate) mod tests {
                 velocity_filter: 0.1,
                 diffusion: Diffusion::Auto,
                 acceleration_term: AccelerationTerm::Auto,
+                dispersion_correction: false,
                 geometry_strain_limit: None,
                 integrator: Integrator::default(),
             },

@@ -10,7 +10,10 @@ use sandboil_sph::{
 };
 
 /// Limit of the skeleton wave over `h / c_d` with free surfaces: 0.994 at h = 1.4 dx, where it is least.
-const DRAINED_COEFFICIENT: f64 = 0.99;
+pub const DRAINED_COEFFICIENT: f64 = 0.99;
+/// Largest factor of dispersion-corrected inertia on the squared frequency of any wave, and on the rate of its damping:
+/// the limit becomes `0.73 h / c_d` (0.735 at h = 1.4 dx and Poisson's ratio zero, where it is least).
+pub const CORRECTED_RESPONSE: f64 = (DRAINED_COEFFICIENT / 0.73) * (DRAINED_COEFFICIENT / 0.73);
 /// Limit of the undrained wave over `h / c_u`, surfaces at prescribed pressure.
 const UNDRAINED_COEFFICIENT: f64 = 1.7;
 /// The same where pressure is prescribed nowhere: undrained soil.
@@ -18,7 +21,7 @@ const FREE_UNDRAINED_COEFFICIENT: f64 = 0.9;
 /// Explicit diffusion: `dt <= 0.65 dx^2 C / k`.
 const DIFFUSION_COEFFICIENT: f64 = 0.65;
 /// Largest eigenvalue of the velocity filter over `xi C_s / dx`.
-const FILTER_EIGENVALUE: f64 = 1.05;
+pub const FILTER_EIGENVALUE: f64 = 1.05;
 /// Largest shear-wave over compression-wave speed of a soil: that of Poisson's ratio zero.
 const LARGEST_SPEED_RATIO: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Damping ratio of the fastest wave above which its viscous part alone, `dt < 1/(xi w)`, allows less than the wave,
@@ -69,6 +72,21 @@ pub enum PressureCoupling {
     Implicit,
 }
 
+/// Members of a stencil inside the undeformed lattice, at a place seen from one of its nodes, m.
+pub fn lattice(model: &Model, at: Vec2) -> Vec<Member> {
+    let support = WendlandQuintic::new(model.smoothing_length()).support();
+    let volume = model.spacing.x * model.spacing.y;
+    let reach = |spacing: f64, at: f64| ((support + at.abs()) / spacing).ceil();
+    let (columns, rows) = (reach(model.spacing.x, at.x), reach(model.spacing.y, at.y));
+    let span = |count: f64| (0..).map(move |k| f64::from(k) - count).take_while(move |k| *k <= count);
+    span(columns)
+        .flat_map(|column| span(rows).map(move |row| (column, row)))
+        .map(|(column, row)| Vec2::new(column * model.spacing.x, row * model.spacing.y) - at)
+        .filter(|offset| offset.norm() < support)
+        .map(|offset| Member { owner: 0, source: 0, mirrored: false, offset, volume })
+        .collect()
+}
+
 /// How the pressure operators of Eq. 7 see waves on the undeformed lattice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressureSpectrum {
@@ -80,16 +98,7 @@ impl PressureSpectrum {
     /// Samples the spectrum of the model's lattice.
     pub fn new(model: &Model) -> Self {
         let kernel = WendlandQuintic::new(model.smoothing_length());
-        let volume = model.spacing.x * model.spacing.y;
-        let reach = |spacing: f64| (kernel.support() / spacing).ceil();
-        let (columns, rows) = (reach(model.spacing.x), reach(model.spacing.y));
-        let span = |count: f64| (0..).map(move |k| f64::from(k) - count).take_while(move |k| *k <= count);
-        let members: Vec<Member> = span(columns)
-            .flat_map(|column| span(rows).map(move |row| (column, row)))
-            .map(|(column, row)| Vec2::new(column * model.spacing.x, row * model.spacing.y))
-            .filter(|offset| offset.norm() < kernel.support())
-            .map(|offset| Member { owner: 0, source: 0, mirrored: false, offset, volume })
-            .collect();
+        let members = lattice(model, Vec2::zeros());
         let corrected = corrected_gradient(&members, kernel).unwrap_or_default();
         let factor = laplacian_factor(&members, &corrected);
         let diagonal = Vec2::new(1.0 / model.spacing.x, 1.0 / model.spacing.y);
@@ -147,7 +156,8 @@ fn left_by_damping(ratio: f64) -> f64 {
 /// Limit for one region at a skeleton stiffness `K + 4G/3` in kPa, s.
 ///
 /// `spectrum` belongs to implicit diffusion and is read only there. Rayleigh damping acts on the skeleton alone: its
-/// rate is that of the skeleton's fastest wave, whatever the water adds to the frequency.
+/// rate is that of the skeleton's fastest wave, whatever the water adds to the frequency. `response` is the largest
+/// factor on the acceleration that a force gives, one without correction of inertia.
 pub fn region_limit(
     model: &Model,
     region: usize,
@@ -155,13 +165,15 @@ pub fn region_limit(
     coupling: PressureCoupling,
     spectrum: &PressureSpectrum,
     rayleigh: Option<&Rayleigh>,
+    response: f64,
 ) -> (f64, Criterion) {
     let h = model.smoothing_length();
-    let density = model.mixture_density(region);
+    let density = model.mixture_density(region) / response;
     let undamped = |coefficient: f64, stiffness: f64| coefficient * h / (stiffness / density).sqrt();
     let longest = undamped(DRAINED_COEFFICIENT, skeleton_stiffness);
     let rate = rayleigh.map_or(0.0, |damping| damping.rate(2.0 / longest));
-    let (filter, viscous) = (filter_ratio(model), |limit: f64| 0.25 * rate * limit);
+    // The filter's rate rises with the response, the frequency that it is compared with by the root.
+    let (filter, viscous) = (filter_ratio(model) * response.sqrt(), |limit: f64| 0.25 * rate * limit);
     let wave = |coefficient: f64, stiffness: f64, criterion: Criterion| {
         let limit = undamped(coefficient, stiffness);
         let ratio = viscous(limit);

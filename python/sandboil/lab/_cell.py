@@ -228,6 +228,7 @@ def shear_cell(
                 "velocity_filter": velocity_filter,
                 "diffusion": "auto",
                 "acceleration_term": "auto",
+                "dispersion_correction": False,
                 "geometry_strain_limit": None,
                 "integrator": integrator,
                 "integrator_tolerance": tolerance,

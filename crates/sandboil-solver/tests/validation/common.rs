@@ -15,6 +15,7 @@ pub fn numerics() -> Numerics {
         velocity_filter: 0.2,
         diffusion: Diffusion::Auto,
         acceleration_term: AccelerationTerm::Auto,
+        dispersion_correction: false,
         geometry_strain_limit: None,
         integrator: Integrator::default(),
     }
