@@ -18,7 +18,8 @@ pub fn weightless(mut model: Model) -> Model {
     model
 }
 
-/// Horizontal velocity at the surface of a column under an upgoing wave: times and values.
+/// Velocity at the surface of a column under an upgoing wave, horizontal, or vertical if that is what `adjust` makes of
+/// the wave: times and values.
 pub fn surface_velocity(
     model: &Model,
     upgoing: impl Fn(f64) -> f64,
@@ -33,11 +34,13 @@ pub fn surface_velocity(
     let surface = Vec2::new(model.position[0].x, model.surface_elevation[0]);
     let mut stage = shaking(Some(UpgoingWave::shear(INTERVAL, velocity)), duration, vec![surface]);
     adjust(&mut stage);
+    let rising = stage.base.waves.iter().any(|wave| !wave.vertical.is_empty());
+    let channel = if rising { "velocity_y" } else { "velocity_x" };
     simulation.begin_shaking(stage).unwrap();
     assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
     let (times, values) = simulation.take_histories();
     let channels = simulation.channel_names();
-    let place = channels.iter().position(|name| *name == "velocity_x").unwrap();
+    let place = channels.iter().position(|name| *name == channel).unwrap();
     (times, values.chunks(channels.len()).map(|row| row[place]).collect())
 }
 
