@@ -2,8 +2,8 @@
 
 Undrained ground has the limit of a block with free corners, of which a column bears 1.3 times. Under Rayleigh
 damping the limit is that of one mode with the most of wave, filter and viscosity, of which a column bears 1.3
-times, or 1.4 times where water drains in part. Corrected inertia is reckoned with a free block of no Poisson effect;
-with water that drains within the step the column bears 1.3 times that.
+times, or 1.4 times where water drains in part. Corrected inertia is reckoned with a free block of no Poisson
+effect; with water that drains within the step the column bears 1.3 times that.
 """
 
 from __future__ import annotations
