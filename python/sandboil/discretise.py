@@ -14,6 +14,12 @@ from .scene import Scene
 
 Floats = NDArray[np.float64]
 
+# Least distance of a particle from a base that is not level, in spacings: its stress nodes, a quarter of a
+# spacing below it, then lie in the soil. A particle on the base coincides with its own image: dry ground 12 m
+# high on bases of 5 to 30 degrees finds no rest in 5000 steps at a distance of 0; it does in 2200 to 3300 at
+# 0.1, in 1100 to 1900 at 0.25, and 700 to 1200 at 0.5, where more of the soil is left out.
+BASE_CLEARANCE = 0.25
+
 
 @dataclass(frozen=True)
 class Overburden:
@@ -145,7 +151,8 @@ def discretise(scene: Scene) -> Discretisation:
 
     The bounding box is divided evenly, by the number of cells nearest to scene.spacing, one at least. A cell
     belongs to the region that holds its centre; a centre on a common boundary (within a micrometre) to the
-    region listed first. Raises :class:`InvalidInput` if a region gets no particle.
+    region listed first. Centres too near to a base that is not level are left out. Raises
+    :class:`InvalidInput` if a region gets no particle.
     """
     x0, y0, x1, y1 = scene.bounds
     columns, rows = (max(1, round(extent / scene.spacing)) for extent in (x1 - x0, y1 - y0))
@@ -160,6 +167,11 @@ def discretise(scene: Scene) -> Discretisation:
         reach = shapely.buffer(region.geometry, COORDINATE_TOLERANCE, join_style="mitre")
         shapely.prepare(reach)
         owner[(owner == outside) & shapely.intersects_xy(reach, centre_x, centre_y)] = index
+    if not scene.outline.base_is_level:
+        inside = np.flatnonzero(owner != outside)
+        centres = shapely.points(centre_x[inside], centre_y[inside])
+        above = shapely.distance(centres, shapely.LineString(scene.outline.base))
+        owner[inside[above < BASE_CLEARANCE * min(dx, dy)]] = outside
     for index, region in enumerate(scene.regions):
         if not (owner == index).any():
             raise InvalidInput(
@@ -169,7 +181,7 @@ def discretise(scene: Scene) -> Discretisation:
                 "reduce it",
             )
 
-    inside = owner != outside
+    inside = np.flatnonzero(owner != outside)
     position = np.column_stack([centre_x[inside], centre_y[inside]])
     region_index = owner[inside]
     soils = [region.resolved(scene) for region in scene.regions]
