@@ -415,6 +415,11 @@ LATE = [BaseSegment((0, 20)), BaseSegment((20, 40), delay=1.5)]
             "component of the motion that another would replace",
         ),
         (lambda: slope(sides={"kind": "free_field"}), "scene.sides.kind", "must be one of"),
+        (
+            lambda: slope(numerics={"dispersion_correction": True}),
+            "scene.numerics.dispersion_correction",
+            "left out beside free-field sides",
+        ),
     ],
 )
 def test_boundaries_that_contradict_are_refused(make: Any, path: str, told: str) -> None:

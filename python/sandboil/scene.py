@@ -624,6 +624,7 @@ class Scene(Model):
         self._check_stages()
         self._check_bases()
         self._check_damping()
+        self._check_inertia()
         self._check_output()
         return self
 
@@ -885,6 +886,15 @@ class Scene(Model):
                     "strain, so a viscous stress may feed waves instead of damping them",
                     "numerics.local_damping works with both, or take operators = 'conservative'",
                 )
+
+    def _check_inertia(self) -> None:
+        if self.numerics.dispersion_correction and "free-field" in self.side_kinds:
+            raise InvalidInput(
+                "scene.numerics.dispersion_correction",
+                True,
+                "must be left out beside free-field sides, whose push is reckoned with the plain inertia",
+                "level ground on Periodic sides may have it; elsewhere take a smaller spacing",
+            )
 
     def _check_output(self) -> None:
         left, bottom, right, top = self.bounds
