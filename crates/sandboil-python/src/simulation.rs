@@ -207,6 +207,8 @@ impl Simulation {
             duration: get(stage, "duration")?,
             base: base(stage)?,
             free_field: [is_free(&left)?, is_free(&right)?],
+            column_records: [None, None],
+            record_columns: None,
             local_damping: get(stage, "local_damping")?,
             rayleigh: rayleigh.map(|(ratio, frequencies)| solver::Rayleigh { ratio, frequencies }),
             time_step_factor: get::<Option<f64>>(stage, "time_step_factor")?

@@ -84,6 +84,11 @@ impl Cofactor {
         xx * x.x + xy * x.y + yx * y.x + yy * y.y
     }
 
+    /// The components times a factor, `[xX, xY, yX, yY]`.
+    pub fn scaled(&self, factor: f64) -> [f64; 4] {
+        self.0.map(|component| factor * component)
+    }
+
     /// Nominal stress `J sigma F^-T` as `[xX, xY, yX, yY]`, kPa: force in space on areas of the geometry's frame.
     #[inline]
     pub fn nominal(&self, stress: &Stress) -> [f64; 4] {

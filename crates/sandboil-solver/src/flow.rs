@@ -121,17 +121,16 @@ impl Flow {
         4 * size_of_val(self.excess.as_slice()) + size_of_val(self.cofactor.as_slice()) + factors
     }
 
-    /// A weight of the excess pressure of node `i`, carried into the deformed frame.
-    #[inline]
-    pub fn carried(&self, i: usize, weight: Vec2) -> Vec2 {
-        self.cofactor[i].carry(weight)
+    /// Nominal excess pressure `q J F^-T` of node `i`, kPa.
+    pub fn nominal(&self, i: usize) -> [f64; 4] {
+        self.cofactor[i].scaled(self.excess[i])
     }
 
     /// Force of the excess pressure on node `j`, kN/m: the exact transpose of the divergence.
     #[inline]
     pub fn force(&self, tables: &FlowTables, j: usize) -> Vec2 {
         let row = tables.divergence.transposed.iter_row(j);
-        row.map(|(i, weight)| self.carried(i, *weight) * self.excess[i]).sum()
+        row.map(|(i, weight)| self.cofactor[i].carry(*weight) * self.excess[i]).sum()
     }
 
     /// Advances the excess pressure by one step from the velocity field at its middle (Eq. 7) and the deformation of

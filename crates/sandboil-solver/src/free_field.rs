@@ -10,6 +10,7 @@
 use crate::{
     base::{Base, BaseSegment, Dashpot, Dashpots, trace},
     boundary::{EdgeNodes, Hand, Outline, Side, Surroundings, Walls, id},
+    column::{Column, ColumnRecord, Present},
     error::SolverError,
     geometry::{Geometry, Stencils, StrainRow, VectorWeight, divergence_row, stress_node_positions},
     model::{Model, Operators, STRESS_NODES},
@@ -31,15 +32,6 @@ pub struct FreeField {
     sides: Vec<TiedSide>,
 }
 
-/// A column one node wide, its own image on both sides.
-#[derive(Debug)]
-struct Column {
-    simulation: Simulation,
-    /// Internal index of the node of each row, from below.
-    rows: Vec<usize>,
-    velocity_before: Vec<Vec2>,
-}
-
 /// What acts on the section at one side.
 #[derive(Debug)]
 struct TiedSide {
@@ -49,9 +41,11 @@ struct TiedSide {
     /// Weights of the column's rows in the motion that the dashpots' points would have with it.
     trace: Csr<f64>,
     tables: SideTables,
-    /// Nominal stress of the column when increments began, kPa.
+    /// Nominal stress and pore pressure of the column when increments began, kPa.
     reference: Vec<[f64; 4]>,
-    reference_pressure: Vec<f64>,
+    reference_water: Vec<[f64; 4]>,
+    /// Velocities towards which the dashpots pull, m/s.
+    targets: Vec<f64>,
     /// Force of the step on the nodes of the tables, kN/m.
     force: Vec<Vec2>,
 }
@@ -60,9 +54,9 @@ struct TiedSide {
 #[derive(Debug, Default)]
 struct SideTables {
     nodes: Vec<usize>,
-    /// Volume times weight: rows are `nodes`, columns the column's stress nodes.
+    /// Volume times weight: rows are `nodes`, columns the stress nodes of the column's rows.
     stress: Csr<VectorWeight>,
-    /// Volume times weight: rows are `nodes`, columns the column's nodes; empty without water.
+    /// Volume times weight: rows are `nodes`, columns the column's rows; empty without water.
     pressure: Csr<Vec2>,
     /// Length of base whose traction the cut trace misses, m.
     base: Vec<f64>,
@@ -110,12 +104,19 @@ impl FreeField {
             let segment = stage.base.at(side.x);
             let same =
                 made.iter().position(|(other, arrival)| *arrival == segment && same_column(other, &model));
-            let column = if let Some(column) = same {
-                column
-            } else {
-                free_field.columns.push(Column::at_rest(&model, gravity)?);
-                made.push((model, segment));
-                made.len() - 1
+            let column = match (same, &stage.column_records[hand as usize]) {
+                (Some(column), _) => column,
+                (None, recorded) => {
+                    free_field.columns.push(match recorded {
+                        Some(record) => {
+                            record.validate(model.nodes(), model.water.is_some(), stage.duration)?;
+                            Column::recorded(record.clone())
+                        }
+                        None => Column::at_rest(&model, gravity)?,
+                    });
+                    made.push((model, segment));
+                    made.len() - 1
+                }
             };
             free_field.sides.push(TiedSide {
                 hand,
@@ -124,7 +125,8 @@ impl FreeField {
                 trace: Csr::default(),
                 tables: SideTables::default(),
                 reference: Vec::new(),
-                reference_pressure: Vec::new(),
+                reference_water: Vec::new(),
+                targets: Vec::new(),
                 force: Vec::new(),
             });
         }
@@ -145,19 +147,22 @@ impl FreeField {
             let TiedSide { hand, column, .. } = self.sides[k];
             let Some(side) = section.outline.sides[hand as usize] else { continue };
             if !std::mem::replace(&mut begun[column], true) {
-                self.columns[column].simulation.begin_shaking(Shaking {
+                let of_column = Shaking {
                     base: Base {
                         segments: vec![stage.base.at(side.x)],
                         datum: Some(stage.base.datum.unwrap_or_else(|| section.model.outline.lowest())),
                         ..stage.base.clone()
                     },
                     free_field: [false; 2],
+                    column_records: [None, None],
+                    record_columns: None,
                     probes: Vec::new(),
                     stress_histories: false,
                     pressure_envelope: false,
                     strain_envelope: false,
                     ..stage.clone()
-                })?;
+                };
+                self.columns[column].begin_shaking(of_column, stage.record_columns)?;
             }
             (self.sides[k].dashpots, self.sides[k].trace) =
                 side_dashpots(section, (hand, side), &self.columns[column])?;
@@ -170,10 +175,10 @@ impl FreeField {
     pub fn renew(&mut self, section: &Section) {
         for side in &mut self.sides {
             let column = &self.columns[side.column];
-            side.tables = SideTables::new(section, side.hand, column);
+            side.tables = SideTables::new(section, side.hand);
             side.force = vec![Vec2::zeros(); side.tables.nodes.len()];
-            side.reference = column.nominal_stress();
-            side.reference_pressure = column.simulation.excess().to_vec();
+            side.targets = vec![0.0; side.dashpots.all().len()];
+            side.begin_increments(column);
         }
     }
 
@@ -181,17 +186,14 @@ impl FreeField {
     pub fn set_excess(&mut self, edges: &EdgeNodes, excess: &[f64]) {
         for side in &mut self.sides {
             let column = &mut self.columns[side.column];
-            for (&node, &row) in edges.sides[side.hand as usize].iter().zip(&column.rows) {
-                column.simulation.set_excess_at(row, excess[node]);
-            }
-            column.simulation.store_reaction();
-            side.reference_pressure = column.simulation.excess().to_vec();
+            column.set_excess(edges.sides[side.hand as usize].iter().map(|&node| excess[node]));
+            side.begin_increments(column);
         }
     }
 
     /// Number of velocities that columns lend to the section.
     pub fn guests(&self) -> usize {
-        self.sides.iter().map(|side| self.columns[side.column].rows.len()).sum()
+        self.sides.iter().map(|side| self.columns[side.column].rows()).sum()
     }
 
     /// Lets the section's strain see the velocities lent, which stand from index `nodes` on.
@@ -203,21 +205,18 @@ impl FreeField {
                 renumbered(&side.tables.strain, shifted),
                 renumbered(&side.tables.divergence, shifted),
             );
-            first += id(self.columns[side.column].rows.len());
+            first += id(self.columns[side.column].rows());
         }
     }
 
     /// Copies the columns' motion to where the section sees it.
     pub fn lend(&self, velocity: &mut [Vec2], acceleration: &mut [Vec2]) {
         let lent = self.sides.iter().flat_map(|side| {
-            let column = &self.columns[side.column];
-            column
-                .rows
-                .iter()
-                .map(|&row| (column.simulation.velocity_of(row), column.simulation.acceleration_of(row)))
+            let present = self.columns[side.column].present();
+            present.velocity.iter().zip(&present.acceleration)
         });
         for ((v, a), (lent_v, lent_a)) in velocity.iter_mut().zip(acceleration).zip(lent) {
-            (*v, *a) = (lent_v, lent_a);
+            (*v, *a) = (*lent_v, *lent_a);
         }
     }
 
@@ -230,15 +229,25 @@ impl FreeField {
         }
     }
 
-    /// The columns.
+    /// The columns that are solved.
     pub fn columns(&self) -> impl Iterator<Item = &Simulation> {
-        self.columns.iter().map(|column| &column.simulation)
+        self.columns.iter().filter_map(Column::simulation)
+    }
+
+    /// What the column of each side did in the stage, if it is kept; equal columns give it once for both.
+    pub fn take_records(&mut self) -> [Option<ColumnRecord>; 2] {
+        let taken: Vec<Option<ColumnRecord>> = self.columns.iter_mut().map(Column::take_record).collect();
+        let mut records = [None, None];
+        for side in &self.sides {
+            records[side.hand as usize].clone_from(&taken[side.column]);
+        }
+        records
     }
 
     /// Renews the geometry of every column.
     pub fn renew_columns(&mut self) {
         for column in &mut self.columns {
-            column.simulation.renew_geometry(None);
+            column.renew_geometry();
         }
     }
 
@@ -247,18 +256,18 @@ impl FreeField {
     /// # Errors
     /// A column that has diverged.
     pub fn begin_step(&mut self, dt: f64, velocity: &[Vec2]) -> Result<(), SolverError> {
+        for column in &mut self.columns {
+            column.observe();
+        }
         for side in &mut self.sides {
-            let column = &self.columns[side.column];
-            side.push(column);
+            side.push(self.columns[side.column].present());
             side.dashpots.begin_step(velocity);
         }
         for column in &mut self.columns {
-            column.velocity_before.clear();
-            column.velocity_before.extend(column.rows.iter().map(|&row| column.simulation.velocity_of(row)));
-            column.simulation.column_step(dt)?;
+            column.step(dt)?;
         }
         for side in &mut self.sides {
-            let traction = self.columns[side.column].simulation.base_traction();
+            let traction = self.columns[side.column].present().base_traction;
             for (force, length) in side.force.iter_mut().zip(&side.tables.base) {
                 *force += traction * *length;
             }
@@ -280,33 +289,31 @@ impl FreeField {
     /// The dashpots of the step: they pull towards the columns' motion.
     pub fn end_step(&mut self, dt: f64, mass: &[f64], velocity: &mut [Vec2], acceleration: &mut [Vec2]) {
         for side in &mut self.sides {
-            let column = &self.columns[side.column];
+            let present = self.columns[side.column].present();
+            let TiedSide { dashpots, trace, targets, .. } = side;
             // The column's motion as the section's own trace would read it.
-            let target = |dashpot: &Dashpot| {
+            for (target, dashpot) in targets.iter_mut().zip(dashpots.all()) {
                 let read = |(row, weight): (usize, &f64)| {
-                    let now = column.simulation.velocity_of(column.rows[row]);
-                    weight * (now + column.velocity_before[row]).dot(&dashpot.direction)
+                    let twice = present.velocity[row] + present.velocity_before[row];
+                    weight * twice.dot(&dashpot.direction)
                 };
-                0.5 * side.trace.iter_row(dashpot.point).map(read).sum::<f64>()
-            };
-            let targets: Vec<f64> = side.dashpots.all().iter().map(target).collect();
-            side.dashpots.end_step(dt, mass, (velocity, acceleration), |k| targets[k]);
+                *target = 0.5 * trace.iter_row(dashpot.point).map(read).sum::<f64>();
+            }
+            dashpots.end_step(dt, mass, (velocity, acceleration), |k| targets[k]);
         }
     }
 
     /// Bytes held, columns included.
     pub fn bytes(&self) -> usize {
-        let column =
-            |column: &Column| column.simulation.arrays().iter().map(|(_, bytes)| bytes).sum::<usize>();
         let side = |side: &TiedSide| {
             side.dashpots.bytes()
                 + side.tables.stress.bytes()
                 + side.tables.pressure.bytes()
                 + size_of_val(side.reference.as_slice())
-                + size_of_val(side.reference_pressure.as_slice())
+                + size_of_val(side.reference_water.as_slice())
                 + 2 * size_of_val(side.force.as_slice())
         };
-        self.columns.iter().map(column).sum::<usize>() + self.sides.iter().map(side).sum::<usize>()
+        self.columns.iter().map(Column::bytes).sum::<usize>() + self.sides.iter().map(side).sum::<usize>()
     }
 }
 
@@ -319,41 +326,30 @@ fn renumbered<T: Copy>(
     rows.iter().map(|(&row, entries)| (row, renumber(entries))).collect()
 }
 
-impl Column {
-    fn at_rest(model: &Model, gravity: Option<Gravity>) -> Result<Self, SolverError> {
-        let mut simulation = Simulation::new(model, 1)?;
-        if let Some(gravity) = gravity {
-            simulation.begin_gravity(gravity)?;
-            simulation.advance(u64::MAX, f64::INFINITY)?;
-        }
-        let rows = simulation.internal_order();
-        Ok(Self { simulation, rows, velocity_before: Vec::new() })
-    }
-
-    /// Nominal stress `[xx, xy, yx, yy]` of the column's stress nodes, kPa.
-    fn nominal_stress(&self) -> Vec<[f64; 4]> {
-        self.simulation.stress_points().iter().map(|p| p.deformation.cofactor().nominal(&p.stress)).collect()
-    }
-}
-
 impl TiedSide {
+    /// Lets pushes count from what the column now is.
+    fn begin_increments(&mut self, column: &Column) {
+        self.reference.clone_from(&column.present().stress);
+        self.reference_water.clone_from(&column.present().water);
+    }
+
     /// Force of the increments of the column's stress and pressure on the section (Eq. 6 beyond the side).
-    fn push(&mut self, column: &Column) {
-        let now = column.simulation.stress_points();
-        let excess = column.simulation.excess();
+    fn push(&mut self, present: &Present) {
         for (row, force) in self.force.iter_mut().enumerate() {
             *force = Vec2::zeros();
             for (s, weight) in self.tables.stress.iter_row(row) {
-                let nominal = now[s].deformation.cofactor().nominal(&now[s].stress);
-                let reference = &self.reference[s];
-                *force -= weight.contract([0, 1, 2, 3].map(|c| nominal[c] - reference[c]));
+                *force -= weight.contract(difference(&present.stress[s], &self.reference[s]));
             }
             for (i, weight) in self.tables.pressure.iter_row(row) {
-                let carried = column.simulation.carried_by_water(i, *weight);
-                *force += carried * (excess[i] - self.reference_pressure[i]);
+                let [xx, xy, yx, yy] = difference(&present.water[i], &self.reference_water[i]);
+                *force += Vec2::new(xx * weight.x + xy * weight.y, yx * weight.x + yy * weight.y);
             }
         }
     }
+}
+
+fn difference(a: &[f64; 4], b: &[f64; 4]) -> [f64; 4] {
+    [0, 1, 2, 3].map(|c| a[c] - b[c])
 }
 
 /// The soil at a side as a column between periodic sides.
@@ -408,8 +404,7 @@ fn side_dashpots(
     let nodes = &edges.sides[hand as usize];
     let points: Vec<Vec2> = nodes.iter().map(|&node| Vec2::new(side.x, position[node].y)).collect();
     let mut all = Vec::with_capacity(2 * nodes.len());
-    for (point, &row) in column.rows.iter().enumerate() {
-        let below = column.simulation.small_strain_impedance(row)?;
+    for (point, below) in column.impedance()?.into_iter().enumerate() {
         let (eta_s, eta_p) = (below.density * below.shear_speed, below.density * below.compression_speed);
         for (direction, impedance) in [(Vec2::x(), eta_p), (Vec2::y(), eta_s)] {
             all.push(Dashpot { point, direction, impedance, length: model.spacing.y });
@@ -459,20 +454,20 @@ impl Rows {
 }
 
 impl SideTables {
-    fn new(section: &Section, hand: Hand, column: &Column) -> Self {
+    fn new(section: &Section, hand: Hand) -> Self {
         match section.model.numerics.operators {
-            Operators::Conservative => Self::completed(section, hand, column),
-            Operators::Printed => Self::on_outermost_row(section, hand, column),
+            Operators::Conservative => Self::completed(section, hand),
+            Operators::Printed => Self::on_outermost_row(section, hand),
         }
     }
 
     /// The column's traction on the outermost node of each row.
-    fn on_outermost_row(section: &Section, hand: Hand, column: &Column) -> Self {
+    fn on_outermost_row(section: &Section, hand: Hand) -> Self {
         let nodes = section.edges.sides[hand as usize].clone();
         let outward = hand.normal() * section.model.spacing.y;
         let (mut stress, mut pressure) =
             (Csr::with_capacity(nodes.len(), 0), Csr::with_capacity(nodes.len(), 0));
-        for &row in &column.rows {
+        for row in 0..nodes.len() {
             let share = VectorWeight::plain(-outward / STRESS_NODES as f64);
             stress.push_row(&mut [0, 1].map(|k| (id(STRESS_NODES * row + k), share)));
             let wet = section.model.water.is_some();
@@ -482,7 +477,7 @@ impl SideTables {
     }
 
     /// Weights of stencils completed by the column beyond the side, less those of the cut ones.
-    fn completed(section: &Section, hand: Hand, column: &Column) -> Self {
+    fn completed(section: &Section, hand: Hand) -> Self {
         let model = section.model;
         let strip = Strip::new(section, hand);
         let cut = strip.around(section, section.outline, strip.local.len());
@@ -528,7 +523,7 @@ impl SideTables {
             for (owner, mut weight) in weights {
                 if (owner as usize) < strip.local.len() && weight.magnitude() > negligible {
                     weight *= strip.volume[node] / STRESS_NODES as f64;
-                    stress[owner as usize].push((id(STRESS_NODES * column.rows[row] + k), weight));
+                    stress[owner as usize].push((id(STRESS_NODES * row + k), weight));
                 }
             }
         }
@@ -557,7 +552,7 @@ impl SideTables {
                 let Some(row) = strip.row[node] else { continue };
                 for (owner, weight) in weights {
                     if (owner as usize) < strip.local.len() && weight.norm() > negligible {
-                        pressure[owner as usize].push((id(column.rows[row]), weight * strip.volume[node]));
+                        pressure[owner as usize].push((id(row), weight * strip.volume[node]));
                     }
                 }
             }

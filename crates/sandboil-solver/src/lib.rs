@@ -7,6 +7,7 @@
 mod banded;
 pub mod base;
 pub mod boundary;
+pub mod column;
 mod deformation;
 mod dispersion;
 pub mod error;
@@ -28,6 +29,7 @@ mod timestep;
 
 pub use base::{Base, BaseSegment, HalfSpace, UpgoingWave, Vertical};
 pub use boundary::{Outline, Side, Support};
+pub use column::ColumnRecord;
 pub use error::SolverError;
 pub use model::{AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, Water, stress_node_offset};
 pub use rayleigh::Rayleigh;

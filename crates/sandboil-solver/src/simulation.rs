@@ -3,6 +3,7 @@
 use crate::{
     base::{Base, CompliantBase, Impedance, Vertical},
     boundary::{EdgeNodes, Outline, Walls, base_condition},
+    column::ColumnRecord,
     deformation::Deformation,
     dispersion::Dispersion,
     error::SolverError,
@@ -61,6 +62,10 @@ pub struct Shaking {
     pub base: Base,
     /// Whether the left and the right side become free-field sides; else they stay the walls they are in statics.
     pub free_field: [bool; 2],
+    /// What the columns of the left and the right side did before under the same motion, to be read instead of solved.
+    pub column_records: [Option<ColumnRecord>; 2],
+    /// Interval at which what the columns do is recorded, s.
+    pub record_columns: Option<f64>,
     /// Local damping `xi_l` of Eq. 16.
     pub local_damping: f64,
     /// Rayleigh damping, if any.
@@ -714,6 +719,16 @@ impl Simulation {
         Ok(self.is_complete())
     }
 
+    /// What the free-field columns of the left and the right side did in the stage, if it is recorded; once.
+    pub fn take_column_records(&mut self) -> [Option<ColumnRecord>; 2] {
+        match &mut self.active {
+            Active::Shaking(shaking) => {
+                shaking.free_field.as_mut().map_or([None, None], FreeField::take_records)
+            }
+            _ => [None, None],
+        }
+    }
+
     /// Whether the stage has reached its end.
     pub fn is_complete(&self) -> bool {
         match &self.active {
@@ -1040,14 +1055,15 @@ impl Simulation {
         self.acceleration[node]
     }
 
-    /// All stress nodes.
-    pub(crate) fn stress_points(&self) -> &[StressPoint] {
-        &self.points
+    /// Nominal effective stress `[xx, xy, yx, yy]` of a stress node, kPa.
+    pub(crate) fn nominal_stress(&self, s: usize) -> [f64; 4] {
+        let StressPoint { deformation, stress, .. } = &self.points[s];
+        deformation.cofactor().nominal(stress)
     }
 
-    /// Excess pore pressure of all nodes, kPa; empty without water.
-    pub(crate) fn excess(&self) -> &[f64] {
-        self.flow.as_ref().map_or(&[], |flow| &flow.excess)
+    /// Nominal excess pore pressure `q J F^-T` of a node, kPa; zero without water.
+    pub(crate) fn nominal_water(&self, node: usize) -> [f64; 4] {
+        self.flow.as_ref().map_or([0.0; 4], |flow| flow.nominal(node))
     }
 
     /// Sets the excess pore pressure of a node, kPa.
@@ -1055,11 +1071,6 @@ impl Simulation {
         if let Some(flow) = &mut self.flow {
             flow.excess[node] = excess;
         }
-    }
-
-    /// A weight of a node's excess pressure as its water carries it into the deformed frame.
-    pub(crate) fn carried_by_water(&self, node: usize, weight: Vec2) -> Vec2 {
-        self.flow.as_ref().map_or(weight, |flow| flow.carried(node, weight))
     }
 
     /// Traction of the compliant base in the last step, mean over its points, kPa.

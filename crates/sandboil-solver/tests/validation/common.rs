@@ -72,6 +72,8 @@ pub fn shaking(wave: Option<UpgoingWave>, duration: f64, probes: Vec<Vec2>) -> S
         duration,
         base: Base::shaken_by(wave),
         free_field: [false; 2],
+        column_records: [None, None],
+        record_columns: None,
         local_damping: 0.0,
         rayleigh: None,
         time_step_factor: SHAKING_FACTOR,

@@ -78,3 +78,37 @@ fn a_block_follows_its_column() {
         assert!(worst < 0.025, "{worst}");
     }
 }
+
+/// A column read from the record of an earlier run moves the block as the solved one did, to the interval's curvature.
+#[test]
+fn a_recorded_column_does_what_the_solved_one_did() {
+    const INTERVAL: f64 = 2.5e-3;
+    let mut region = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
+    region.hydraulic_conductivity = 1e-3;
+    let model = block(HEIGHT, SPACING, 10, region, Some(WATER));
+    let stage = on_free_field(shaking(Some(pulse(5.0, 0.1)), 0.5, Vec::new()));
+    let mut solved = at_rest(&model);
+    solved.begin_shaking(Shaking { record_columns: Some(INTERVAL), ..stage.clone() }).unwrap();
+    let mut velocities = Vec::new();
+    while !solved.is_complete() {
+        solved.advance(1, f64::INFINITY).unwrap();
+        velocities.push(solved.velocity());
+    }
+    let records = solved.take_column_records();
+    assert!(records.iter().all(Option::is_some));
+    let mut replayed = at_rest(&model);
+    let short = Shaking { column_records: records.clone(), duration: 1.0, ..stage.clone() };
+    assert!(replayed.begin_shaking(short).is_err());
+    let mut replayed = at_rest(&model);
+    replayed.begin_shaking(Shaking { column_records: records, ..stage }).unwrap();
+    let (mut peak, mut apart) = (0.0_f64, 0.0_f64);
+    for then in &velocities {
+        replayed.advance(1, f64::INFINITY).unwrap();
+        for (now, then) in replayed.velocity().iter().zip(then) {
+            peak = peak.max(then[0].abs());
+            apart = apart.max((now[0] - then[0]).hypot(now[1] - then[1]));
+        }
+    }
+    println!("frames every {INTERVAL} s: {:.3} % of the peak", 100.0 * apart / peak);
+    assert!(apart < 0.005 * peak, "{apart} {peak}");
+}
