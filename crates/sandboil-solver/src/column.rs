@@ -79,8 +79,7 @@ impl ColumnRecord {
         }
         let width = Self::width(rows, wet);
         let frames = self.values.len() / width;
-        // The last frame comes before the stage's last step and is held to its end.
-        let covered = self.interval * frames as f64;
+        let covered = self.interval * frames.saturating_sub(1) as f64;
         if !self.values.len().is_multiple_of(width) || !(covered >= duration) {
             let (name, value) = ("column_record", covered);
             return Err(SolverError::InvalidInput { name, value, expected: "as long as the stage, in s" });
@@ -290,7 +289,7 @@ impl Column {
 
     /// The record of the stage so far, if it is kept.
     pub fn take_record(&mut self) -> Option<ColumnRecord> {
-        self.recorder.take().map(|recorder| recorder.record)
+        self.recorder.take().map(Recorder::closed)
     }
 
     /// Bytes held.
@@ -355,6 +354,23 @@ impl Recorder {
         }
         *before = time;
         last.copy_from_slice(&self.sample);
+    }
+
+    /// The record, with a frame after the last step: straight on from the last one through the last step's values. A
+    /// stage ends within half a step after those, so two frames at most.
+    fn closed(mut self) -> ColumnRecord {
+        let width = self.sample.len();
+        let (time, values) = &self.last;
+        if let Some(from) = self.record.values.len().checked_sub(width) {
+            let frame = self.record.values[from..].to_vec();
+            let since = time - (self.frames - 1) as f64 * self.record.interval;
+            for ahead in [1.0, 2.0] {
+                let factor = if since > 0.0 { ahead * self.record.interval / since } else { 0.0 };
+                let further = frame.iter().zip(values).map(|(frame, value)| frame + factor * (value - frame));
+                self.record.values.extend(further);
+            }
+        }
+        self.record
     }
 }
 
