@@ -486,6 +486,30 @@ impl Simulation {
         Ok(())
     }
 
+    /// Gives the section a velocity field (m/s, user's node order) before the first step of shaking: waves under way.
+    ///
+    /// # Errors
+    /// A stage that has begun to move, or an array of the wrong length.
+    pub fn set_velocity(&mut self, velocity: &[[f64; 2]]) -> Result<(), SolverError> {
+        let (found, expected) = (velocity.len(), self.model.nodes());
+        if found != expected {
+            return Err(SolverError::Shape { name: "velocity", found, expected });
+        }
+        let (Active::Shaking(_), 0) = (&self.active, self.step) else {
+            return Err(SolverError::Order {
+                call: "set_velocity",
+                needs: "a shaking stage that has just begun",
+            });
+        };
+        for (slot, &user) in self.velocity.iter_mut().zip(&self.order) {
+            *slot = velocity[user].into();
+        }
+        let velocity = std::mem::take(&mut self.velocity);
+        self.refresh_shares(&velocity);
+        self.velocity = velocity;
+        Ok(())
+    }
+
     fn begin(&mut self, active: Active) {
         self.active = active;
         self.time = 0.0;

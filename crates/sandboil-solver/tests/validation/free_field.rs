@@ -15,7 +15,7 @@ const GRAVITY_STAGE: Gravity = Gravity { tolerance: 1e-5, max_steps: 20_000 };
 const SHEAR_MODULUS: f64 = 2e4;
 
 /// A column's soil between two sides, rollers in statics.
-fn block(height: f64, spacing: f64, columns: usize, region: Region, water: Option<Water>) -> Model {
+pub fn block(height: f64, spacing: f64, columns: usize, region: Region, water: Option<Water>) -> Model {
     let mut model = column(height, spacing, columns, region, water);
     let side = |x: f64| Some(Side { x, extent: [0.0, height], support: Support::FreeSlip });
     model.outline.sides = [side(0.0), side(columns as f64 * spacing)];

@@ -5,6 +5,7 @@
 mod common;
 mod consolidation;
 mod free_field;
+mod half_space;
 mod rayleigh;
 mod shear_cell;
 mod stages;

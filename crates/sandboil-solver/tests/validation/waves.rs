@@ -13,8 +13,14 @@ pub fn ricker(frequency: f64, time: f64) -> f64 {
 
 /// The same column without weight: initial stress turns with the soil and would change its wave speed.
 pub fn weightless(mut model: Model) -> Model {
-    model.gravity *= 1e-9;
+    const LITTLE: f64 = 1e-9;
+    model.gravity *= LITTLE;
     model.vertical_effective_stress.fill(0.0);
+    // Water keeps its density.
+    if let Some(water) = &mut model.water {
+        water.unit_weight *= LITTLE;
+        model.pore_pressure.fill(0.0);
+    }
     model
 }
 
