@@ -38,6 +38,8 @@ pub struct Flow {
     unit_weight: f64,
     gravity: f64,
     surface: Vec<SurfaceNode>,
+    /// Share of each node's excess pressure in the force: none of a node tied to the surface, all of the others.
+    push: Vec<f64>,
     scheme: Scheme,
     right_hand_side: Vec<f64>,
 }
@@ -71,8 +73,12 @@ impl Flow {
         let water = model.water?;
         let conductivity: Vec<f64> =
             model.region.iter().map(|&r| model.regions[r as usize].hydraulic_conductivity).collect();
-        let surface =
+        let surface: Vec<SurfaceNode> =
             surface_nodes(model).into_iter().filter(|tie| conductivity[tie.node as usize] > 0.0).collect();
+        let mut push = vec![1.0; model.nodes()];
+        for tie in &surface {
+            push[tie.node as usize] = 0.0;
+        }
         Some(Self {
             excess: vec![0.0; model.nodes()],
             cofactor: vec![Deformation::default().cofactor(); model.nodes()],
@@ -81,6 +87,7 @@ impl Flow {
             unit_weight: water.unit_weight,
             gravity: model.gravity,
             surface,
+            push,
             scheme: match scheme {
                 FlowScheme::Undrained => Scheme::Undrained,
                 FlowScheme::Explicit => Scheme::Explicit { acceleration_term: false },
@@ -118,19 +125,19 @@ impl Flow {
             Scheme::Implicit { factors: Some((_, lu)) } => lu.bytes(),
             _ => 0,
         };
-        4 * size_of_val(self.excess.as_slice()) + size_of_val(self.cofactor.as_slice()) + factors
+        5 * size_of_val(self.excess.as_slice()) + size_of_val(self.cofactor.as_slice()) + factors
     }
 
     /// Nominal excess pressure `q J F^-T` of node `i`, kPa.
     pub fn nominal(&self, i: usize) -> [f64; 4] {
-        self.cofactor[i].scaled(self.excess[i])
+        self.cofactor[i].scaled(self.excess[i] * self.push[i])
     }
 
     /// Force of the excess pressure on node `j`, kN/m: the exact transpose of the divergence.
     #[inline]
     pub fn force(&self, tables: &FlowTables, j: usize) -> Vec2 {
         let row = tables.divergence.transposed.iter_row(j);
-        row.map(|(i, weight)| self.cofactor[i].carry(*weight) * self.excess[i]).sum()
+        row.map(|(i, weight)| self.cofactor[i].carry(*weight) * (self.excess[i] * self.push[i])).sum()
     }
 
     /// Advances the excess pressure by one step from the velocity field at its middle (Eq. 7) and the deformation of

@@ -142,3 +142,30 @@ fn envelopes_see_every_step() {
     assert_eq!(simulation.largest_excess_pore_pressure().unwrap(), pressure);
     assert_eq!(simulation.largest_shear_strain().unwrap(), strain);
 }
+
+/// Water that can leave at the surface, but hardly does: a wide section disturbed by noise only calms down. The node below
+/// the surface is tied to the one under it, and would feed waves if its pressure pushed.
+#[test]
+fn a_wide_section_of_low_permeability_calms_down() {
+    const NOISE: f64 = 1e-4;
+    for conductivity in [1e-9, 1e-6, 1e-4] {
+        for smoothing_ratio in [1.2, 1.4] {
+            let mut region = elastic(4e4, 8e4);
+            region.hydraulic_conductivity = conductivity;
+            let mut model = column(6.0, 1.0, 24, region, Some(WATER));
+            model.numerics.smoothing_ratio = smoothing_ratio;
+            let mut simulation = at_rest(&model);
+            simulation.begin_shaking(shaking(None, 4.0, Vec::new())).unwrap();
+            // A fixed sequence that looks like none.
+            let noise = |k: usize| NOISE * (12.9898 * (k as f64) + 78.233).sin();
+            let velocity: Vec<[f64; 2]> =
+                (0..model.nodes()).map(|k| [noise(2 * k), noise(2 * k + 1)]).collect();
+            simulation.set_velocity(&velocity).unwrap();
+            assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
+            let size = |v: [f64; 2]| v[0].hypot(v[1]);
+            let largest = simulation.velocity().into_iter().map(size).fold(0.0, f64::max);
+            println!("k {conductivity} m/s, h/dx {smoothing_ratio}: {largest:.1e} m/s left of {NOISE}");
+            assert!(largest < 0.2 * NOISE, "{largest}");
+        }
+    }
+}
