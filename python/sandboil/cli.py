@@ -87,6 +87,12 @@ def run(
     kind: RunKindOption = None,
     accuracy: AccuracyOption = "standard",
     threads: ThreadsOption = 2,
+    columns: Annotated[
+        Path | None, typer.Option(help="Folder of a run whose free-field columns are read again.")
+    ] = None,
+    keep_columns: Annotated[
+        bool, typer.Option("--keep-columns", help="Keep the free-field columns for other runs.")
+    ] = False,
 ) -> None:
     """Compute a scene. Ctrl-C ends it with readable results."""
     said = _scene(scene, motion, unit, column, kind)
@@ -96,7 +102,9 @@ def run(
         with warnings.catch_warnings():
             # They are told above, before the run's long time.
             warnings.simplefilter("ignore", SandboilWarning)
-            results = run_scene(said, out, threads=threads, accuracy=accuracy)
+            results = run_scene(
+                said, out, threads=threads, accuracy=accuracy, columns=columns, keep_columns=keep_columns
+            )
     except InvalidInput:
         raise
     except SandboilError as error:

@@ -19,6 +19,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from ._errors import InvalidInput, RunInterrupted, SandboilError
+from .columns import save as save_column
 from .results import FILE_NAME, Run, Writer
 from .scene import Gravity, Scene
 from .simulation import LOOK_INTERVAL, Simulation, unknown_name
@@ -63,6 +64,9 @@ def run(
     threads: int = 2,
     accuracy: Accuracy = "standard",
     progress: bool | None = None,
+    *,
+    columns: str | os.PathLike[str] | None = None,
+    keep_columns: bool = False,
 ) -> Run:
     """Compute a scene into a folder and return its results.
 
@@ -73,6 +77,8 @@ def run(
     threads : that share the work; results are the same bits for any number
     accuracy : fills only those numerics that the scene leaves open
     progress : whether to show a bar on stderr; default only on a terminal
+    columns : folder of a run that kept its free-field columns: they are read instead of solved again
+    keep_columns : whether to keep the columns, in `free_field.h5`
 
     Raises
     ------
@@ -84,7 +90,7 @@ def run(
     scene = with_accuracy(scene, accuracy)
     folder = Path(out)
     _refuse_unusable(folder)
-    simulation = Simulation(scene, threads)
+    simulation = Simulation(scene, threads, columns=columns, keep_columns=keep_columns)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         writer = Writer(folder / FILE_NAME, simulation, accuracy)
@@ -96,6 +102,8 @@ def run(
                 if index > 0:
                     simulation.begin_next_stage()
                 _run_stage(simulation, writer, interrupt, bar)
+                for stage, hand, fingerprint, record in simulation.take_columns():
+                    save_column(folder, stage, hand, fingerprint, record)
         except RunInterrupted as error:
             writer.close("interrupted", str(error))
             raise

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 import warnings
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,10 @@ import numpy as np
 from . import _core
 from ._errors import InvalidInput, SandboilError, SandboilWarning, nearest_name
 from .boundaries import Periodic
+from .columns import HANDS, ColumnRecord
+from .columns import INTERVAL as COLUMN_INTERVAL
+from .columns import key as column_key
+from .columns import load as load_columns
 from .discretise import Discretisation, Floats, discretise
 from .motion import Motion
 from .scene import Gravity, Region, Scene, Shaking
@@ -135,6 +141,8 @@ class Simulation:
     ----------
     scene : what is computed
     threads : that share the work; results are the same bits for any number
+    columns : folder of a run that kept its free-field columns, which are read instead of solved again
+    keep_columns : whether to record the columns for :meth:`take_columns`
 
     Attributes
     ----------
@@ -150,7 +158,14 @@ class Simulation:
     SimulationDiverged : from the stepping methods, when a field is no longer finite; fields stay readable
     """
 
-    def __init__(self, scene: Scene, threads: int = 2) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        threads: int = 2,
+        *,
+        columns: str | os.PathLike[str] | None = None,
+        keep_columns: bool = False,
+    ) -> None:
         if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= MAX_THREADS:
             raise InvalidInput("threads", threads, f"must be a whole number from 1 to {MAX_THREADS}")
         self.scene = scene
@@ -163,7 +178,15 @@ class Simulation:
         self.doubts = doubts(scene, loaded)
         for doubt in self.doubts:
             warnings.warn(doubt, SandboilWarning, stacklevel=2)
-        self._core = _core.Simulation(_description(scene, self.particles), threads)
+        section = _description(scene, self.particles)
+        self._stages = [
+            _shaking_description(scene, stage, duration, waves, self.probes)
+            if isinstance(stage, Shaking) and duration is not None and waves is not None
+            else None
+            for stage, duration, waves in zip(scene.stages, self._durations, self._waves, strict=True)
+        ]
+        self._columns = self._use_columns(section, columns, keep_columns)
+        self._core = _core.Simulation(section, threads)
         self._index = -1
         self._begin_next_stage()
 
@@ -256,10 +279,45 @@ class Simulation:
         if isinstance(stage, Gravity):
             self._core.begin_gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
             return
-        duration, waves = self.duration, self._waves[self._index]
-        assert duration is not None
-        assert waves is not None
-        self._core.begin_shaking(_shaking_description(self.scene, stage, duration, waves, self.probes))
+        shaking = self._stages[self._index]
+        assert shaking is not None
+        self._core.begin_shaking(shaking)
+
+    def _use_columns(
+        self, section: dict[str, Any], read: str | os.PathLike[str] | None, keep: bool
+    ) -> list[tuple[str, str, str]]:
+        """Stage, side and fingerprint of every free-field column; stages are told which to read and keep."""
+        if read is None and not keep:
+            return []
+        sides = [
+            hand for hand, kind in zip(HANDS, self.scene.side_kinds, strict=True) if kind == "free-field"
+        ]
+        if not sides:
+            name, value = ("columns", str(read)) if read is not None else ("keep_columns", keep)
+            raise InvalidInput(name, value, "goes with free-field sides, of which the scene has none")
+        stages = dict(zip(self.scene.stage_names, self._stages, strict=True))
+        keys = [
+            (name, hand, column_key(section, stage, hand))
+            for name, stage in stages.items()
+            if stage is not None
+            for hand in sides
+        ]
+        found = {} if read is None else load_columns(Path(read), keys)
+        for name, stage in stages.items():
+            if stage is not None:
+                kept = [found.get((name, hand)) for hand in HANDS]
+                stage["column_records"] = tuple(None if one is None else one.core() for one in kept)
+                stage["record_columns"] = COLUMN_INTERVAL if keep else None
+        return keys
+
+    def take_columns(self) -> list[tuple[str, str, str, ColumnRecord]]:
+        """Stage, side, fingerprint and record of the present stage's columns, if they are kept; once."""
+        records = dict(zip(HANDS, self._core.take_column_records(), strict=True))
+        return [
+            (stage, hand, fingerprint, ColumnRecord.of_core(told))
+            for stage, hand, fingerprint in self._columns
+            if stage == self.stage and (told := records[hand]) is not None
+        ]
 
     # Reading
 
@@ -561,6 +619,8 @@ def _shaking_description(
             ],
         },
         "sides": (left, right),
+        "column_records": (None, None),
+        "record_columns": None,
         "local_damping": scene.numerics.local_damping,
         "rayleigh": None if rayleigh is None else (rayleigh.ratio, rayleigh.frequencies),
         "time_step_factor": scene.numerics.time_step_factor,

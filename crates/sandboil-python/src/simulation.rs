@@ -171,6 +171,27 @@ fn model(dict: &Bound<'_, PyDict>) -> PyResult<solver::Model> {
     })
 }
 
+fn column_record(dict: &Bound<'_, PyDict>) -> PyResult<solver::ColumnRecord> {
+    let impedance: PyReadonlyArray2<'_, f64> = get(dict, "impedance")?;
+    let row = |row: numpy::ndarray::ArrayView1<'_, f64>| solver::Impedance {
+        density: row[0],
+        shear_speed: row[1],
+        compression_speed: row[2],
+    };
+    Ok(solver::ColumnRecord {
+        interval: get(dict, "interval")?,
+        impedance: impedance.as_array().outer_iter().map(row).collect(),
+        wet: get(dict, "wet")?,
+        values: get::<PyReadonlyArray1<'_, f64>>(dict, "values")?.as_slice()?.to_vec(),
+    })
+}
+
+fn column_records(stage: &Bound<'_, PyDict>) -> PyResult<[Option<solver::ColumnRecord>; 2]> {
+    let [left, right] = get::<[Option<Bound<'_, PyDict>>; 2]>(stage, "column_records")?;
+    let read = |record: Option<Bound<'_, PyDict>>| record.as_ref().map(column_record).transpose();
+    Ok([read(left)?, read(right)?])
+}
+
 /// Offset of a node's first stress node, m; the second lies opposite.
 #[pyfunction]
 pub fn stress_node_offset(dx: f64, dy: f64) -> (f64, f64) {
@@ -207,8 +228,8 @@ impl Simulation {
             duration: get(stage, "duration")?,
             base: base(stage)?,
             free_field: [is_free(&left)?, is_free(&right)?],
-            column_records: [None, None],
-            record_columns: None,
+            column_records: column_records(stage)?,
+            record_columns: get(stage, "record_columns")?,
             local_damping: get(stage, "local_damping")?,
             rayleigh: rayleigh.map(|(ratio, frequencies)| solver::Rayleigh { ratio, frequencies }),
             time_step_factor: get::<Option<f64>>(stage, "time_step_factor")?
@@ -336,6 +357,25 @@ impl Simulation {
     /// Strain (n, 2, 3): `xx, yy`, engineering `xy` of both stress nodes.
     fn strain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         pages(py, &self.inner.strain())
+    }
+
+    /// What the columns of the left and the right side did in the stage, if it is recorded; once.
+    fn take_column_records<'py>(&mut self, py: Python<'py>) -> PyResult<[Option<Bound<'py, PyDict>>; 2]> {
+        let told = |record: solver::ColumnRecord| -> PyResult<Bound<'py, PyDict>> {
+            let dict = PyDict::new(py);
+            let rows = record.impedance.len();
+            let speeds = record.impedance.iter();
+            let impedance: Vec<f64> =
+                speeds.flat_map(|row| [row.density, row.shear_speed, row.compression_speed]).collect();
+            dict.set_item("interval", record.interval)?;
+            dict.set_item("impedance", shaped(impedance, (rows, 3))?.to_pyarray(py))?;
+            dict.set_item("wet", record.wet)?;
+            dict.set_item("width", solver::ColumnRecord::width(rows, record.wet))?;
+            dict.set_item("values", record.values.to_pyarray(py))?;
+            Ok(dict)
+        };
+        let [left, right] = self.inner.take_column_records();
+        Ok([left.map(told).transpose()?, right.map(told).transpose()?])
     }
 
     fn channel_names(&self) -> Vec<&'static str> {

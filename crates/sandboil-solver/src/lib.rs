@@ -27,7 +27,7 @@ mod soil_field;
 mod spectrum_tests;
 mod timestep;
 
-pub use base::{Base, BaseSegment, HalfSpace, UpgoingWave, Vertical};
+pub use base::{Base, BaseSegment, HalfSpace, Impedance, UpgoingWave, Vertical};
 pub use boundary::{Outline, Side, Support};
 pub use column::ColumnRecord;
 pub use error::SolverError;

@@ -1,0 +1,154 @@
+"""Free-field columns kept by one run and read by another, instead of being solved again.
+
+Two scenes share a column if the ground at the side, the motion that comes to it and the numerics are the
+same, whatever stands between the sides: a dam with and without its berm.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ._errors import InvalidInput
+
+Floats = NDArray[np.float64]
+
+# Where a run keeps its columns, beside its results.
+FILE_NAME = "free_field.h5"
+
+# Time between the frames kept, s: straight lines between them lose 0.1 % of a pulse of 5 Hz
+# (docs/validation.md).
+INTERVAL = 0.0025
+
+HANDS = ("left", "right")
+
+
+@dataclass(frozen=True)
+class ColumnRecord:
+    """What a column did in a stage.
+
+    Attributes
+    ----------
+    interval : time between frames, s
+    impedance : (rows, 3) density (Mg/m3), shear and compression wave speed (m/s) of every row from below
+    wet : whether pore pressure is among the values
+    values : (frames, width) increments of nominal stress and pore pressure (kPa), velocities (m/s) and the
+        base's traction (kPa)
+    """
+
+    interval: float
+    impedance: Floats
+    wet: bool
+    values: Floats
+
+    def core(self) -> dict[str, Any]:
+        """As the numerical core takes it."""
+        return {
+            "interval": self.interval,
+            "impedance": np.ascontiguousarray(self.impedance),
+            "wet": self.wet,
+            "values": np.ascontiguousarray(self.values).reshape(-1),
+        }
+
+    @classmethod
+    def of_core(cls, told: dict[str, Any]) -> ColumnRecord:
+        """From what the numerical core gives."""
+        width = int(told["width"])
+        return cls(told["interval"], told["impedance"], told["wet"], told["values"].reshape(-1, width))
+
+
+def key(section: dict[str, Any], stage: dict[str, Any], hand: str) -> str:
+    """Fingerprint of a column: of everything that has a say in what it does in a stage.
+
+    `section` and `stage` are the descriptions that the numerical core is given.
+    """
+    side, base = section[hand], stage["base"]
+    position: Floats = section["position"]
+    x = position[:, 0].min() if hand == "left" else position[:, 0].max()
+    # The outermost nodes of the lattice: centres of one column of equal cells.
+    inside = np.abs(position[:, 0] - x) < 0.5 * section["spacing"][0]
+    inside &= (position[:, 1] >= side["bottom"]) & (position[:, 1] <= side["top"])
+    rows = np.flatnonzero(inside)
+    rows = rows[np.argsort(position[rows, 1])]
+    stress = section["vertical_effective_stress"].reshape(-1, 2)[rows]
+    wet = section["water"] is not None
+    start, _, wave, delay, slowness = next(
+        (segment for segment in base["segments"] if side["x"] <= segment[1]), base["segments"][-1]
+    )
+    lowest = float(section["base"][:, 1].min())
+    said = {
+        "y": position[rows, 1],
+        "soils": [section["regions"][region] for region in section["region"][rows]],
+        "surface": section["surface_elevation"][rows],
+        "stress": stress,
+        "pressure": section["pore_pressure"][rows] if wet else [],
+        "spacing": section["spacing"],
+        "water": section["water"],
+        "gravity": section["gravity"],
+        "base": [float(np.interp(x, *section["base"].T)), lowest, section["base_support"]],
+        "numerics": section["numerics"],
+        "wave": None if wave is None else stage["waves"][wave],
+        "arrival": delay + (slowness * (side["x"] - start) if slowness else 0.0),
+        **{name: base[name] for name in ("vertical", "half_space")},
+        **{name: stage[name] for name in ("duration", "local_damping", "rayleigh", "time_step_factor")},
+    }
+    text = json.dumps(said, sort_keys=True, default=lambda value: np.asarray(value).tolist())
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def save(folder: Path, stage: str, hand: str, fingerprint: str, record: ColumnRecord) -> None:
+    """Add a stage's column to the file of a folder."""
+    with h5py.File(folder / FILE_NAME, "a") as file:
+        group = file.create_group(f"{stage}/{hand}")
+        group.attrs["key"] = fingerprint
+        group.attrs["interval_s"] = record.interval
+        group.attrs["wet"] = record.wet
+        group.create_dataset("impedance", data=record.impedance)
+        group.create_dataset("values", data=record.values, compression="gzip", shuffle=True)
+
+
+def load(
+    folder: str | Path, fingerprints: Sequence[tuple[str, str, str]]
+) -> dict[tuple[str, str], ColumnRecord]:
+    """The columns of (stage, hand, fingerprint) kept in a folder, by stage and hand.
+
+    Raises :class:`InvalidInput` if the folder holds none, or those of other ground, motion or numerics.
+    """
+    path = Path(folder) / FILE_NAME
+    if not path.is_file():
+        raise InvalidInput(
+            "columns",
+            str(folder),
+            f"must be the folder of a run that kept its columns, but has no {FILE_NAME}",
+            "run that scene with keep_columns=True",
+        )
+    found = {}
+    try:
+        with h5py.File(path, "r") as file:
+            for stage, hand, fingerprint in fingerprints:
+                group = file.get(f"{stage}/{hand}")
+                if group is None or group.attrs["key"] != fingerprint:
+                    told = "no column" if group is None else "a column of other ground, motion or numerics"
+                    raise InvalidInput(
+                        "columns",
+                        str(folder),
+                        f"must hold the scene's own columns, but has {told} on the {hand} in {stage!r}",
+                        "leave columns out: they are then solved, which takes a few per cent of a run",
+                    )
+                found[stage, hand] = ColumnRecord(
+                    float(group.attrs["interval_s"]),
+                    np.asarray(group["impedance"][()], dtype=np.float64),
+                    bool(group.attrs["wet"]),
+                    np.asarray(group["values"][()], dtype=np.float64),
+                )
+    except (OSError, KeyError) as error:
+        raise InvalidInput("columns", str(folder), f"must hold a sound {FILE_NAME}: {error}") from error
+    return found

@@ -1,0 +1,94 @@
+"""Free-field columns kept by one run and read by another."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import sandboil as sb
+from sandboil import InvalidInput
+from sandboil.columns import FILE_NAME
+
+MOTION = sb.Motion.ricker(frequency=4.0, pga_g=0.2)
+SAND = sb.PM4Sand(Dr=0.55, G0=677.0, hpo=0.40)
+
+
+def ground(width: float = 4.0, sides: Any = None, motion: sb.Motion = MOTION, **changes: Any) -> sb.Scene:
+    """Six metres of sand under water between free-field sides, shaken for a second."""
+    return sb.Scene(
+        spacing=0.5,
+        water=sb.Water(),
+        water_table=sb.WaterTable(depth=0),
+        regions=[
+            sb.Region("sand", sb.box(x=(0, width), y=(0, 6)), SAND, hydraulic_conductivity=1e-4, Gs=2.67)
+        ],
+        sides=sides or sb.FreeField(),
+        stages=[sb.Gravity(), sb.Shaking(motion, duration=1.0)],
+        output=sb.Output(depths=[2.0], field_dt=0.5),
+        **changes,
+    )
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> sb.Run:
+    return sb.run(ground(), tmp_path_factory.mktemp("columns") / "kept", threads=1, keep_columns=True)
+
+
+def test_a_run_on_kept_columns_is_the_run_that_kept_them(kept: sb.Run, tmp_path: Path) -> None:
+    again = sb.run(ground(), tmp_path / "again", threads=1, columns=kept.path.parent)
+    for name, at in (("velocity_x", "surface"), ("r_u", 2.0)):
+        then, now = (
+            run.history(name) if at == "surface" else run.history(name, depth=at) for run in (kept, again)
+        )
+        assert np.abs(now.values - then.values).max() < 0.005 * np.abs(then.values).max()
+
+
+def test_another_section_beside_the_same_ground_may_read_them(kept: sb.Run, tmp_path: Path) -> None:
+    wider = sb.run(ground(width=8.0), tmp_path / "wider", threads=1, columns=kept.path.parent)
+    assert wider.summary()
+
+
+def test_a_run_keeps_nothing_unless_it_is_asked(tmp_path: Path) -> None:
+    sb.run(ground(), tmp_path / "plain", threads=1)
+    assert not (tmp_path / "plain" / FILE_NAME).exists()
+
+
+@pytest.mark.parametrize(
+    ("scene", "told"),
+    [
+        (ground(motion=MOTION.scaled(factor=1.01)), "other ground, motion or numerics"),
+        (ground(numerics=sb.Numerics(velocity_filter=0.3)), "other ground, motion or numerics"),
+        (ground(gravity=9.8), "other ground, motion or numerics"),
+        (ground(sides=sb.Roller()), "goes with free-field sides"),
+        (ground(sides=sb.Sides(sb.FreeField(), sb.Roller()), motion=MOTION.flipped()), "on the left"),
+    ],
+)
+def test_columns_of_another_scene_are_refused(
+    kept: sb.Run, tmp_path: Path, scene: sb.Scene, told: str
+) -> None:
+    with pytest.raises(InvalidInput) as refused:
+        sb.run(scene, tmp_path / "out", columns=kept.path.parent)
+    assert refused.value.path == "columns"
+    assert told in refused.value.allowed
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_without_sound_columns_is_refused(kept: sb.Run, tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match=r"has no free_field\.h5"):
+        sb.run(ground(), tmp_path / "out", columns=tmp_path)
+    (tmp_path / FILE_NAME).write_bytes(b"no HDF5")
+    with pytest.raises(InvalidInput, match="must hold a sound"):
+        sb.run(ground(), tmp_path / "out", columns=tmp_path)
+    (tmp_path / FILE_NAME).write_bytes((kept.path.parent / FILE_NAME).read_bytes())
+    with h5py.File(tmp_path / FILE_NAME, "a") as file:
+        del file["shaking/left/values"]
+    with pytest.raises(InvalidInput, match="must hold a sound"):
+        sb.run(ground(), tmp_path / "out", columns=tmp_path)
+
+
+def test_keeping_columns_needs_some(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="keep_columns"):
+        sb.run(ground(sides=sb.Roller()), tmp_path / "out", keep_columns=True)
