@@ -375,9 +375,10 @@ impl EdgeNodes {
                 }
             }
         }
+        // Above an inclined base the lowest node may be left out, so that the next one stands for its column.
         let near_base = |node: &usize| {
             let at = model.position[*node];
-            at.y - outline.base_elevation(at.x) < spacing.y
+            at.y - outline.base_elevation(at.x) < 2.0 * spacing.y
         };
         let base = columns.into_values().filter(near_base).collect();
         Self { base, sides: rows.map(|rows| rows.into_values().collect()) }

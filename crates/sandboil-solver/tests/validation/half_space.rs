@@ -3,9 +3,9 @@
 use crate::{
     common::{elastic, shaking},
     free_field::block,
-    waves::weightless,
+    waves::{ricker, weightless},
 };
-use sandboil_solver::{Model, Shaking, Simulation, Vertical, Water};
+use sandboil_solver::{Base, BaseSegment, Model, Shaking, Simulation, UpgoingWave, Vertical, Water};
 use sandboil_sph::Vec2;
 
 const DENSITY: f64 = 2.0;
@@ -117,5 +117,143 @@ fn sides_at_45_degrees() {
         let amplitude = (2.0 * energy(&simulation) / before).sqrt();
         println!("{what} at 45 degrees: {:.1} % of the amplitude stays", 100.0 * amplitude);
         assert!((amplitude - theory).abs() < 0.05, "{amplitude}");
+    }
+}
+
+const HEIGHT: f64 = 10.0;
+const FREQUENCY: f64 = 5.0;
+const AMPLITUDE: f64 = 0.01;
+
+fn upgoing(time: f64) -> f64 {
+    AMPLITUDE * ricker(FREQUENCY, time - 1.5 / FREQUENCY)
+}
+
+fn samples() -> Vec<f64> {
+    (0..800).map(|k| upgoing(f64::from(k) * 1e-3)).collect()
+}
+
+/// Weightless ground of level surface on a base that rises to the right by an angle, between free-field sides.
+fn on_inclined_base(angle: f64, spacing: f64, width: f64) -> Model {
+    let slope = angle.to_radians().tan();
+    let columns = (width / spacing).round() as usize;
+    let mut model = weightless(block(HEIGHT, spacing, columns, elastic(SHEAR_MODULUS, BULK_MODULUS), None));
+    // As scenes do, nodes closer to the base than a quarter of the spacing are left out.
+    let keep: Vec<usize> = (0..model.nodes())
+        .filter(|&k| {
+            let x = model.position[k];
+            slope == 0.0 || (x.y - slope * x.x) * slope.atan().cos() > 0.25 * spacing
+        })
+        .collect();
+    model.position = keep.iter().map(|&k| model.position[k]).collect();
+    model.region = vec![0; keep.len()];
+    model.surface_elevation = vec![HEIGHT; keep.len()];
+    model.vertical_effective_stress = vec![0.0; 2 * keep.len()];
+    model.outline.base = vec![Vec2::zeros(), Vec2::new(width, slope * width)];
+    if let [_, Some(right)] = &mut model.outline.sides {
+        right.extent[0] = slope * width;
+    }
+    model
+}
+
+/// Times and one channel at every probe of a stage on free-field sides.
+fn shaken(
+    model: &Model,
+    base: Base,
+    duration: f64,
+    probes: Vec<Vec2>,
+    channel: &str,
+) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let count = probes.len();
+    let mut simulation = Simulation::new(model, 2).unwrap();
+    let stage = Shaking { base, free_field: [true; 2], ..shaking(None, duration, probes) };
+    simulation.begin_shaking(stage).unwrap();
+    assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
+    let (times, values) = simulation.take_histories();
+    let names = simulation.channel_names();
+    let place = names.iter().position(|name| *name == channel).unwrap();
+    let of = |probe: usize| {
+        values.chunks(count * names.len()).map(|row| row[probe * names.len() + place]).collect()
+    };
+    (times, (0..count).map(of).collect())
+}
+
+/// An upgoing shear wave passes an inclined base of its own impedance as if there were none: the surface moves by twice
+/// the wave, late by the height over the base's lowest point. What is left is the staircase of nodes above the base, and the
+/// wave on its way back, which meets the dashpots at the base's angle instead of squarely.
+#[test]
+fn an_inclined_matched_base_is_transparent() {
+    const WIDTH: f64 = 16.0;
+    for (angle, bound) in [(0.0, 2.5), (10.0, 6.0), (20.0, 9.0)] {
+        for vertical in [Vertical::Roller, Vertical::Absorbing] {
+            let model = on_inclined_base(angle, 0.25, WIDTH);
+            let base = Base { vertical, ..Base::shaken_by(Some(UpgoingWave::shear(1e-3, samples()))) };
+            let probes = [0.1, 0.3, 0.5, 0.7, 0.9].map(|share| Vec2::new(share * WIDTH, HEIGHT)).to_vec();
+            let (times, found) = shaken(&model, base, 0.6, probes, "velocity_x");
+            let exact = |t: f64| 2.0 * upgoing(t - HEIGHT / SHEAR_SPEED);
+            let misfit = |probe: &Vec<f64>| {
+                let apart = times.iter().zip(probe).map(|(t, v)| (v - exact(*t)).abs());
+                apart.fold(0.0, f64::max) / (2.0 * AMPLITUDE)
+            };
+            let worst: Vec<f64> = found.iter().map(|probe| 100.0 * misfit(probe)).collect();
+            println!("{angle} degrees, {vertical:?}: off by {worst:.1?} % of the peak along the surface");
+            assert!(worst.iter().all(|off| *off < bound), "{worst:?}");
+        }
+    }
+}
+
+/// A vertical motion comes in through an absorbing base and leaves again: twice the wave at the surface, then silence.
+#[test]
+fn a_compression_wave_comes_in_and_leaves() {
+    for water in [None, Some(WATER)] {
+        let model = weightless(block(HEIGHT, 0.25, 16, elastic(SHEAR_MODULUS, BULK_MODULUS), water));
+        let c = speed(&model, true);
+        let wave = UpgoingWave { interval: 1e-3, horizontal: vec![0.0], vertical: samples() };
+        let base = Base { vertical: Vertical::Absorbing, ..Base::shaken_by(Some(wave)) };
+        let probes = vec![Vec2::new(2.0, HEIGHT), Vec2::new(0.0, HEIGHT)];
+        let (times, found) = shaken(&model, base, 0.8, probes, "velocity_y");
+        for probe in &found {
+            let exact = |t: f64| 2.0 * upgoing(t - HEIGHT / c);
+            let apart = times.iter().zip(probe).map(|(t, v)| (v - exact(*t)).abs()).fold(0.0, f64::max);
+            let late =
+                times.iter().zip(probe).filter(|(t, _)| **t > 0.7).map(|(_, v)| v.abs()).fold(0.0, f64::max);
+            let share = |v: f64| 100.0 * v / (2.0 * AMPLITUDE);
+            println!(
+                "{}: off by {:.2} %, late {:.2} %",
+                if water.is_some() { "saturated" } else { "dry" },
+                share(apart),
+                share(late)
+            );
+            assert!(share(apart) < 3.0 && share(late) < 1.0);
+        }
+    }
+}
+
+/// A wave that runs along the base runs along the surface at the same apparent velocity, as an inclined shear wave does.
+/// The columns beyond the sides take it for a wave that rises at their own time, which blurs it a little.
+#[test]
+fn a_travelling_wave_keeps_its_apparent_velocity() {
+    const WIDTH: f64 = 40.0;
+    for apparent in [500.0, -500.0, 1000.0] {
+        let model = on_inclined_base(0.0, 0.5, WIDTH);
+        let start = if apparent > 0.0 { 0.0 } else { -WIDTH / apparent };
+        let segment =
+            BaseSegment { extent: [0.0, WIDTH], wave: Some(0), delay: start, slowness: 1.0 / apparent };
+        let base = Base {
+            vertical: Vertical::Absorbing,
+            segments: vec![segment],
+            ..Base::shaken_by(Some(UpgoingWave::shear(1e-3, samples())))
+        };
+        let probes = vec![Vec2::new(0.25 * WIDTH, HEIGHT), Vec2::new(0.75 * WIDTH, HEIGHT)];
+        let (times, found) = shaken(&model, base, 0.8, probes, "velocity_x");
+        let arrival = |probe: &Vec<f64>| {
+            let at = (0..probe.len()).max_by(|&a, &b| probe[a].total_cmp(&probe[b])).unwrap();
+            (times[at], probe[at] / (2.0 * AMPLITUDE))
+        };
+        let [(t0, first), (t1, second)] = [arrival(&found[0]), arrival(&found[1])];
+        let seen = 0.5 * WIDTH / (t1 - t0);
+        println!(
+            "apparent {apparent} m/s: {seen:.0} m/s at the surface, peaks {first:.3} and {second:.3} of twice the wave"
+        );
+        assert!((seen / apparent - 1.0).abs() < 0.1, "{seen}");
     }
 }
