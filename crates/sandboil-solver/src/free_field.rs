@@ -220,9 +220,14 @@ impl FreeField {
         }
     }
 
-    /// Adds the pushes of the last step to forces on all nodes, kN/m.
-    pub fn add_force(&self, force: &mut [Vec2]) {
-        for side in &self.sides {
+    /// Adds what the columns' present stress and pressure push to forces on all nodes, kN/m. The traction of their bases is
+    /// no part of it: it passes.
+    pub fn add_push(&mut self, force: &mut [Vec2]) {
+        for column in &mut self.columns {
+            column.observe();
+        }
+        for side in &mut self.sides {
+            side.push(self.columns[side.column].present());
             for (&node, pushed) in side.tables.nodes.iter().zip(&side.force) {
                 force[node] += pushed;
             }

@@ -313,12 +313,12 @@ impl Simulation {
         self.dispersion = corrected.then(|| Dispersion::new(&self.model, self.points.len()));
         let absorbs = stage.base.vertical == Vertical::Absorbing;
         // Another stage of shaking keeps the columns of the one before.
-        let (goes_on, free_field) = match std::mem::replace(&mut self.active, Active::None) {
+        let (goes_on, mut free_field) = match std::mem::replace(&mut self.active, Active::None) {
             Active::Shaking(before) => (true, before.free_field),
             _ => (false, None),
         };
         if goes_on {
-            self.renew_geometry(None);
+            self.renew_geometry(free_field.as_mut());
         } else {
             self.released = Some(self.position.clone());
             self.set_walls(Walls::shaken(
@@ -415,7 +415,7 @@ impl Simulation {
         self.rebuild_geometry();
         let after = self.static_force();
         if let Some(free_field) = free_field {
-            free_field.add_force(&mut before);
+            free_field.add_push(&mut before);
             free_field.renew_columns();
             let outline = self.present_outline();
             free_field.renew(&self.section(&outline));

@@ -112,3 +112,43 @@ fn a_recorded_column_does_what_the_solved_one_did() {
     println!("frames every {INTERVAL} s: {:.3} % of the peak", 100.0 * apart / peak);
     assert!(apart < 0.005 * peak, "{apart} {peak}");
 }
+
+/// One stage of shaking or the same in two: between the stages, and where the geometry is renewed under way, what the
+/// columns push by then stays.
+#[test]
+fn stages_and_renewals_strike_no_blow() {
+    const INTERVAL: f64 = 1e-3;
+    const HALF: f64 = 0.25;
+    let shake = |from: f64| {
+        let velocity = |k: i32| {
+            let t = from + f64::from(k) * INTERVAL;
+            0.5 * t.min(0.1) / 0.1 * (2.0 * std::f64::consts::PI * 4.0 * t).sin()
+        };
+        UpgoingWave::shear(INTERVAL, (0..1000).map(velocity).collect())
+    };
+    let mut region = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
+    region.hydraulic_conductivity = 1e-4;
+    let run = |stages: &[(f64, f64)], strain_limit: Option<f64>| {
+        let mut model = block(HEIGHT, 0.5, 8, region.clone(), Some(WATER));
+        model.numerics.geometry_strain_limit = strain_limit;
+        let mut simulation = at_rest(&model);
+        for &(from, duration) in stages {
+            let stage = on_free_field(shaking(Some(shake(from)), duration, Vec::new()));
+            simulation.begin_shaking(stage).unwrap();
+            assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
+        }
+        (simulation.velocity(), simulation.counters().geometry_builds)
+    };
+    let (one, builds) = run(&[(0.0, 2.0 * HALF)], None);
+    let peak = one.iter().map(|v| v[0].abs()).fold(0.0, f64::max);
+    for (what, stages, limit) in [
+        ("two stages", vec![(0.0, HALF), (HALF, HALF)], None),
+        ("renewals", vec![(0.0, 2.0 * HALF)], Some(2e-3)),
+    ] {
+        let (other, renewed) = run(&stages, limit);
+        let apart = one.iter().zip(&other).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
+        println!("{what}: {:.2} % of {peak:.3} m/s apart, {renewed} geometries", 100.0 * apart / peak);
+        assert!(renewed > builds);
+        assert!(apart < 0.03 * peak, "{apart}");
+    }
+}
