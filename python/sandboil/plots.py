@@ -232,7 +232,8 @@ def section(run: Run, *, stage: str | None = None) -> Figure:
     axes.plot(*np.array([(p.x, p.y) for p in run.probes]).T, "k+", ms=6.0, label="histories")
     axes.set(xlabel="x, m", ylabel="y, m", aspect="equal")
     axes.set_title(f"displacement at {run.frame_times(stage)[-1]:.4g} s", loc="left", fontsize=9)
-    axes.legend(loc="upper right", fontsize=7)
+    # Above the frame: a section may fill any corner of it.
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=7)
     return figure
 
 
