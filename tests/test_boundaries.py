@@ -166,6 +166,7 @@ def test_slopes_are_filled_and_carry_their_own_overburden(points: Any) -> None:
     assert (y - np.interp(x, *outline.base.T) >= BASE_CLEARANCE * 0.5 - 1e-9).all()
 
 
+@pytest.mark.filterwarnings("ignore:scene.regions stand on a base that is not level")
 @pytest.mark.parametrize("angle", [5.0, -15.0])
 def test_ground_on_an_inclined_base_comes_to_rest_and_stays_there(angle: float) -> None:
     scene = slope(inclined(angle), stages=[Gravity(max_steps=5000), Shaking(duration=0.2)])
@@ -419,6 +420,16 @@ LATE = [BaseSegment((0, 20)), BaseSegment((20, 40), delay=1.5)]
             lambda: slope(numerics={"dispersion_correction": True}),
             "scene.numerics.dispersion_correction",
             "left out beside free-field sides",
+        ),
+        (
+            lambda: slope(
+                numerics={"operators": "printed"},
+                regions=[Region("ground", polygon(BENCHES), ROCK, Gs=2.65, porosity=0.4)],
+                water={},
+                water_table={"elevation": 20.0},
+            ),
+            "scene.numerics.operators",
+            "must be 'conservative' in saturated ground",
         ),
     ],
 )

@@ -625,6 +625,7 @@ class Scene(Model):
         self._check_bases()
         self._check_damping()
         self._check_inertia()
+        self._check_printed_water()
         self._check_output()
         return self
 
@@ -894,6 +895,20 @@ class Scene(Model):
                 True,
                 "must be left out beside free-field sides, whose push is reckoned with the plain inertia",
                 "level ground on Periodic sides may have it; elsewhere take a smaller spacing",
+            )
+
+    def _check_printed_water(self) -> None:
+        if (
+            self.numerics.operators == "printed"
+            and self.water is not None
+            and "free-field" in self.side_kinds
+        ):
+            raise InvalidInput(
+                "scene.numerics.operators",
+                "printed",
+                "must be 'conservative' in saturated ground beside free-field sides: Eq. 9 feeds waves where "
+                "pressure is held at no surface",
+                "dry ground or Periodic sides may have the printed operators",
             )
 
     def _check_output(self) -> None:

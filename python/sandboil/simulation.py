@@ -517,8 +517,13 @@ def _stage_motions(scene: Scene, stage: Shaking, path: str) -> StageMotions:
 
 
 def doubts(scene: Scene, loaded: list[StageMotions | None]) -> list[str]:
-    """Why a scene's shaking may not be what was meant; empty if there is no reason known."""
+    """Why the answer may not be what was meant; empty if there is no reason known."""
     told = []
+    if not scene.outline.base_is_level:
+        told.append(
+            "scene.regions stand on a base that is not level: stresses at rest in the rows above it alternate "
+            "by up to 70 %, by 5 % ten rows up; keep soil whose strength matters away from it"
+        )
     for i, (stage, motions) in enumerate(zip(scene.stages, loaded, strict=True)):
         if not isinstance(stage, Shaking) or motions is None:
             continue
