@@ -521,7 +521,7 @@ def doubts(scene: Scene, loaded: list[StageMotions | None]) -> list[str]:
     told = []
     if not scene.outline.base_is_level:
         told.append(
-            "scene.regions stand on a base that is not level: stresses at rest in the rows above it alternate "
+            "scene.regions stand on a base that is not level: stresses at rest in rows above it alternate "
             "by up to 70 %, by 5 % ten rows up; keep soil whose strength matters away from it"
         )
     for i, (stage, motions) in enumerate(zip(scene.stages, loaded, strict=True)):
