@@ -239,7 +239,7 @@ pub fn maximum_shear_strain([xx, yy, xy]: [f64; 3]) -> f64 {
 pub(crate) mod tests {
     use super::*;
     use crate::{
-        boundary::{Condition, Outline, Walls},
+        boundary::{Condition, Outline, Side, Support, Walls},
         model::{AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, STRESS_NODES},
     };
     use proptest::prelude::*;
@@ -325,6 +325,32 @@ pub(crate) mod tests {
         assert!((deformation.xx - 1.3).abs() < 1e-12 && (strain - 1.3_f64.ln()).abs() < 1e-6, "{strain}");
     }
 
+    /// Motions that a sloping base allows are what its images continue: along a smooth one without strain, and in
+    /// proportion to the distance from a rough one, linear at every stress node.
+    #[test]
+    fn images_in_a_slope_continue_what_it_allows() {
+        for slope in [0.1_f64, 0.5, 1.0] {
+            let mut model = square_block(6);
+            let base = [-3.0, 9.0].map(|x| Vec2::new(x, -0.5 - 5.0 * slope + slope * x));
+            model.outline.base = base.to_vec();
+            let along = (base[1] - base[0]).normalize();
+            let away = Vec2::new(-along.y, along.x);
+            let distance = |x: &Vec2| (x - base[0]).dot(&away);
+            for (condition, rate) in [(Condition::FreeSlip, 0.0), (Condition::NoSlip, 0.3)] {
+                let walls = (&model.outline, Walls::shaken(&model.outline, condition, [false; 2]));
+                let geometry = Geometry::build(&model, &model.position, &[1.0; 36], walls, None);
+                assert!(geometry.wall.forward.entries() > 0);
+                let speed = |x: &Vec2| if rate == 0.0 { 1.0 } else { rate * distance(x) };
+                let velocity: Vec<Vec2> = model.position.iter().map(|x| along * speed(x)).collect();
+                for s in 0..STRESS_NODES * model.nodes() {
+                    let (x, y) = motion(&geometry, s, &velocity).gradient();
+                    let error = (x - away * (rate * along.x)).norm() + (y - away * (rate * along.y)).norm();
+                    assert!(error < 1e-12, "{condition:?} {slope}: {error}");
+                }
+            }
+        }
+    }
+
     /// Simple shear to the right turns the soil clockwise: engineering shear and positive spin.
     #[test]
     fn shear_has_its_spin() {
@@ -384,12 +410,16 @@ pub(crate) mod tests {
         #[test]
         fn force_is_the_transpose_of_strain_and_conserves_momentum(
             disorder in vectors(1.0, NODES), v in vectors(1.0, NODES), normal in vectors(9.0, STRESS_NODES * NODES),
-            shear in vectors(9.0, STRESS_NODES * NODES), wall in 0_u8..4, strain in prop_oneof![Just(0.0), Just(0.2)],
+            shear in vectors(9.0, STRESS_NODES * NODES), wall in 0_u8..4, tilt in prop_oneof![Just(0.0), 0.0_f64..0.6], strain in prop_oneof![Just(0.0), Just(0.2)],
         ) {
             let wall_at_base = wall > 0;
             let mut model = disordered(&disorder, None);
             if wall_at_base {
-                model.outline = Outline::level(-0.5);
+                // Level, sloping or curved, with a side or without.
+                let at = |x: f64, y: f64| Vec2::new(x, -0.5 + tilt * y);
+                model.outline.base = vec![at(-1.0, -1.0), at(1.5, 0.3), at(5.0, 1.0)];
+                let side = Side { x: -0.5, extent: [-9.0, 9.0], support: Support::FreeSlip };
+                model.outline.sides[0] = (tilt > 0.1).then_some(side);
             }
             let base = [
                 Condition::NoSlip, Condition::NoSlip, Condition::VerticalRoller, Condition::FreeSlip,
