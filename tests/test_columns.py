@@ -16,7 +16,13 @@ MOTION = sb.Motion.ricker(frequency=4.0, pga_g=0.2)
 SAND = sb.PM4Sand(Dr=0.55, G0=677.0, hpo=0.40)
 
 
-def ground(width: float = 4.0, sides: Any = None, motion: sb.Motion = MOTION, **changes: Any) -> sb.Scene:
+def ground(
+    width: float = 4.0,
+    sides: Any = None,
+    motion: sb.Motion = MOTION,
+    tolerance: float = 1.0e-4,
+    **changes: Any,
+) -> sb.Scene:
     """Six metres of sand under water between free-field sides, shaken for a second."""
     return sb.Scene(
         spacing=0.5,
@@ -26,7 +32,7 @@ def ground(width: float = 4.0, sides: Any = None, motion: sb.Motion = MOTION, **
             sb.Region("sand", sb.box(x=(0, width), y=(0, 6)), SAND, hydraulic_conductivity=1e-4, Gs=2.67)
         ],
         sides=sides or sb.FreeField(),
-        stages=[sb.Gravity(), sb.Shaking(motion, duration=1.0)],
+        stages=[sb.Gravity(tolerance=tolerance), sb.Shaking(motion, duration=1.0)],
         output=sb.Output(depths=[2.0], field_dt=0.5),
         **changes,
     )
@@ -46,6 +52,27 @@ def test_a_run_on_kept_columns_is_the_run_that_kept_them(kept: sb.Run, tmp_path:
         assert np.abs(now.values - then.values).max() < 0.005 * np.abs(then.values).max()
 
 
+def test_what_was_kept_is_what_is_read(kept: sb.Run, tmp_path: Path) -> None:
+    """Columns that moved half as much move the section less: they are not solved again."""
+    (tmp_path / FILE_NAME).write_bytes((kept.path.parent / FILE_NAME).read_bytes())
+    with h5py.File(tmp_path / FILE_NAME, "a") as file:
+        for hand in ("left", "right"):
+            file[f"shaking/{hand}/values"][...] *= 0.5
+    still = sb.run(ground(), tmp_path / "still", threads=1, columns=tmp_path)
+    then, now = (np.abs(run.history("velocity_x").values).max() for run in (kept, still))
+    assert now < 0.9 * then
+
+
+def test_every_stage_reads_its_own_columns(tmp_path: Path) -> None:
+    scene = ground()
+    twice = scene.model_copy(update={"stages": (*scene.stages, sb.Shaking(MOTION.flipped(), duration=1.0))})
+    first = sb.run(twice, tmp_path / "first", threads=1, keep_columns=True)
+    again = sb.run(twice, tmp_path / "again", threads=1, columns=tmp_path / "first")
+    for stage in ("shaking", "shaking_2"):
+        then, now = (run.history("velocity_x", stage=stage).values for run in (first, again))
+        assert np.abs(now - then).max() < 0.01 * np.abs(then).max()
+
+
 def test_another_section_beside_the_same_ground_may_read_them(kept: sb.Run, tmp_path: Path) -> None:
     wider = sb.run(ground(width=8.0), tmp_path / "wider", threads=1, columns=kept.path.parent)
     assert wider.summary()
@@ -62,6 +89,7 @@ def test_a_run_keeps_nothing_unless_it_is_asked(tmp_path: Path) -> None:
         (ground(motion=MOTION.scaled(factor=1.01)), "other ground, motion or numerics"),
         (ground(numerics=sb.Numerics(velocity_filter=0.3)), "other ground, motion or numerics"),
         (ground(gravity=9.8), "other ground, motion or numerics"),
+        (ground(tolerance=1.0e-5), "other ground, motion or numerics"),
         (ground(sides=sb.Roller()), "goes with free-field sides"),
         (ground(sides=sb.Sides(sb.FreeField(), sb.Roller()), motion=MOTION.flipped()), "on the left"),
     ],

@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _core
 from ._errors import InvalidInput
 
 Floats = NDArray[np.float64]
@@ -65,10 +66,11 @@ class ColumnRecord:
         return cls(told["interval"], told["impedance"], told["wet"], told["values"].reshape(-1, width))
 
 
-def key(section: dict[str, Any], stage: dict[str, Any], hand: str) -> str:
+def key(section: dict[str, Any], stage: dict[str, Any], hand: str, tolerance: float) -> str:
     """Fingerprint of a column: of everything that has a say in what it does in a stage.
 
-    `section` and `stage` are the descriptions that the numerical core is given.
+    `section` and `stage` are the descriptions that the numerical core is given, `tolerance` is that of the
+    gravity stage.
     """
     side, base = section[hand], stage["base"]
     position: Floats = section["position"]
@@ -85,6 +87,8 @@ def key(section: dict[str, Any], stage: dict[str, Any], hand: str) -> str:
     )
     lowest = float(section["base"][:, 1].min())
     said = {
+        "version": _core.__version__,
+        "tolerance": tolerance,
         "y": position[rows, 1],
         "soils": [section["regions"][region] for region in section["region"][rows]],
         "surface": section["surface_elevation"][rows],

@@ -297,7 +297,7 @@ class Simulation:
             raise InvalidInput(name, value, "goes with free-field sides, of which the scene has none")
         stages = dict(zip(self.scene.stage_names, self._stages, strict=True))
         keys = [
-            (name, hand, column_key(section, stage, hand))
+            (name, hand, column_key(section, stage, hand, _gravity(self.scene).tolerance))
             for name, stage in stages.items()
             if stage is not None
             for hand in sides

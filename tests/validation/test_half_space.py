@@ -228,7 +228,7 @@ def test_weak_and_strong_shaking(pga_g: float, tmp_path: object) -> None:
     r_u = [run.history("r_u", depth=3.0).values for run in (column, block)]
     print(f"{pga_g} g, saturated sand: r_u up to {r_u[0].max():.3f}, block {r_u[1].max():.3f}")
     assert all(np.isfinite(values).all() for values in r_u)
-    assert abs(r_u[0].max() - r_u[1].max()) < 0.1
+    assert abs(r_u[0].max() - r_u[1].max()) < 0.05
 
 
 def test_liquefied_sand_at_the_sides(tmp_path: object) -> None:
@@ -245,7 +245,7 @@ def test_liquefied_sand_at_the_sides(tmp_path: object) -> None:
         largest = now.values.max(), then.values.max()
         print(f"{where}: r_u up to {largest[0]:.3f}, column {largest[1]:.3f}, {difference.max():.3f} apart")
         assert now.values.max() > 0.9
-        assert np.sqrt(np.mean(difference**2)) < 0.05
+        assert difference.max() < 0.05
 
 
 @pytest.mark.parametrize("contrast", [1e-2, 1.0, 1e2])

@@ -15,9 +15,15 @@ impl From<CoreError> for PyErr {
 fn exception(py: Python<'_>, error: SolverError) -> PyResult<PyErr> {
     let classes = py.import("sandboil._errors")?;
     let keywords = PyDict::new(py);
+    let (error, place) = match error {
+        SolverError::Column { side, source } if matches!(*source, SolverError::Diverged { .. }) => {
+            (*source, format!(" in the free-field column on the {side}"))
+        }
+        other => (other, String::new()),
+    };
     let raised = match error {
         SolverError::Diverged { quantity, node, x, y, value, time, step } => {
-            keywords.set_item("quantity", quantity)?;
+            keywords.set_item("quantity", format!("{quantity}{place}"))?;
             keywords.set_item("node", node)?;
             keywords.set_item("position", (x, y))?;
             keywords.set_item("value", value)?;

@@ -54,6 +54,14 @@ impl Hand {
     /// Both, in the order of every pair of sides.
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
 
+    /// In the user's words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Left => "left",
+            Self::Right => "right",
+        }
+    }
+
     /// Outward normal.
     pub fn normal(self) -> Vec2 {
         match self {
@@ -337,6 +345,10 @@ pub(crate) fn id(index: usize) -> u32 {
     index as u32
 }
 
+/// Height over the base up to which the lowest node of a column stands on it, in spacings: the one below it may have been
+/// left out for being almost on an inclined base.
+const FARTHEST_FROM_BASE: f64 = 2.0;
+
 /// The nodes along the edges, from which tractions are read and on which they act.
 #[derive(Debug, Clone, Default)]
 pub struct EdgeNodes {
@@ -352,8 +364,7 @@ impl EdgeNodes {
         let (spacing, outline) = (model.spacing, &model.outline);
         let first = model.position.iter().fold(Vec2::repeat(f64::INFINITY), |low, x| low.inf(x));
         let place = |x: f64, first: f64, spacing: f64| {
-            #[allow(clippy::cast_possible_truncation)]
-            // cells of a section, checked to be far fewer than 2^63
+            #[allow(clippy::cast_possible_truncation)] // far fewer cells than 2^63
             let cell = ((x - first) / spacing).round() as i64;
             cell
         };
@@ -375,10 +386,9 @@ impl EdgeNodes {
                 }
             }
         }
-        // Above an inclined base the lowest node may be left out, so that the next one stands for its column.
         let near_base = |node: &usize| {
             let at = model.position[*node];
-            at.y - outline.base_elevation(at.x) < 2.0 * spacing.y
+            at.y - outline.base_elevation(at.x) < FARTHEST_FROM_BASE * spacing.y
         };
         let base = columns.into_values().filter(near_base).collect();
         Self { base, sides: rows.map(|rows| rows.into_values().collect()) }

@@ -95,8 +95,7 @@ impl ColumnRecord {
         let width = into.len();
         let place = (time / self.interval).max(0.0);
         let last = self.values.len() / width - 1;
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        // not negative, and bounded by the frames
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a frame's number, not negative
         let before = (place.floor() as usize).min(last);
         let after = (before + 1).min(last);
         let fraction = (place - before as f64).min(1.0);
@@ -154,13 +153,30 @@ impl Column {
         Self { source, present: Present::of_rows(rows, wet), recorder: None }
     }
 
-    /// Begins a stage. With an interval (s) what the column does is recorded.
+    /// Begins a stage. With an interval (s) what the column does is recorded. A column that is read goes on with the
+    /// stage's own record.
     ///
     /// # Errors
-    /// Soil that refuses its stress.
-    pub fn begin_shaking(&mut self, stage: Shaking, record_interval: Option<f64>) -> Result<(), SolverError> {
-        if let Source::Solved { simulation, .. } = &mut self.source {
-            simulation.begin_shaking(stage)?;
+    /// Soil that refuses its stress, or a record of another column, too short or missing.
+    pub fn begin_shaking(
+        &mut self,
+        stage: Shaking,
+        record: Option<&ColumnRecord>,
+        record_interval: Option<f64>,
+    ) -> Result<(), SolverError> {
+        let (rows, wet) = (self.rows(), !self.present.water.is_empty());
+        match &mut self.source {
+            Source::Solved { simulation, .. } => simulation.begin_shaking(stage)?,
+            Source::Recorded { record: read, time, .. } => {
+                let Some(record) = record else {
+                    return Err(SolverError::Order {
+                        call: "begin_shaking",
+                        needs: "a record of the stage for columns that are read",
+                    });
+                };
+                record.validate(rows, wet, stage.duration)?;
+                (*read, *time) = (record.clone(), 0.0);
+            }
         }
         self.observe();
         self.recorder = match (record_interval, &self.source) {

@@ -74,6 +74,14 @@ pub enum SolverError {
         /// The model's own words.
         source: SoilError,
     },
+    /// A free-field column failed.
+    #[error("free-field column on the {side}: {source}")]
+    Column {
+        /// Left or right.
+        side: &'static str,
+        /// What happened to it; its nodes count from below.
+        source: Box<SolverError>,
+    },
     /// The thread pool could not be made.
     #[error("cannot start {threads} threads: {reason}")]
     Threads {

@@ -36,6 +36,8 @@ pub struct FreeField {
 #[derive(Debug)]
 struct TiedSide {
     hand: Hand,
+    /// Where the side stands when shaking begins, m.
+    x: f64,
     column: usize,
     dashpots: Dashpots,
     /// Weights of the column's rows in the motion that the dashpots' points would have with it.
@@ -61,7 +63,7 @@ struct SideTables {
     /// Length of base whose traction the cut trace misses, m.
     base: Vec<f64>,
     /// Weights of the column's velocities in the section's strain, for each stress node near the side; columns are rows
-    /// of the column.
+    /// of the column. The section's geometry takes them over.
     strain: BTreeMap<usize, Vec<(u32, VectorWeight)>>,
     /// The same in the divergence at nodes.
     divergence: BTreeMap<usize, Vec<(u32, Vec2)>>,
@@ -112,7 +114,9 @@ impl FreeField {
                             record.validate(model.nodes(), model.water.is_some(), stage.duration)?;
                             Column::recorded(record.clone())
                         }
-                        None => Column::at_rest(&model, gravity)?,
+                        None => {
+                            Column::at_rest(&model, gravity).map_err(|error| on_side(hand, side.x, error))?
+                        }
                     });
                     made.push((model, segment));
                     made.len() - 1
@@ -120,6 +124,7 @@ impl FreeField {
             };
             free_field.sides.push(TiedSide {
                 hand,
+                x: side.x,
                 column,
                 dashpots: Dashpots::default(),
                 trace: Csr::default(),
@@ -162,7 +167,10 @@ impl FreeField {
                     strain_envelope: false,
                     ..stage.clone()
                 };
-                self.columns[column].begin_shaking(of_column, stage.record_columns)?;
+                let record = stage.column_records[hand as usize].as_ref();
+                self.columns[column]
+                    .begin_shaking(of_column, record, stage.record_columns)
+                    .map_err(|error| on_side(hand, side.x, error))?;
             }
             (self.sides[k].dashpots, self.sides[k].trace) =
                 side_dashpots(section, (hand, side), &self.columns[column])?;
@@ -196,15 +204,13 @@ impl FreeField {
         self.sides.iter().map(|side| self.columns[side.column].rows()).sum()
     }
 
-    /// Lets the section's strain see the velocities lent, which stand from index `nodes` on.
-    pub fn tie(&self, geometry: &mut Geometry, nodes: usize) {
+    /// Lets the section's strain see the velocities lent, which stand from index `nodes` on; once for each renewal.
+    pub fn tie(&mut self, geometry: &mut Geometry, nodes: usize) {
         let mut first = id(nodes);
-        for side in &self.sides {
-            let shifted = |row: u32| first + row;
-            geometry.see_guests(
-                renumbered(&side.tables.strain, shifted),
-                renumbered(&side.tables.divergence, shifted),
-            );
+        for side in &mut self.sides {
+            let (strain, divergence) =
+                (std::mem::take(&mut side.tables.strain), std::mem::take(&mut side.tables.divergence));
+            geometry.see_guests(renumbered(strain, first), renumbered(divergence, first));
             first += id(self.columns[side.column].rows());
         }
     }
@@ -268,8 +274,12 @@ impl FreeField {
             side.push(self.columns[side.column].present());
             side.dashpots.begin_step(velocity);
         }
-        for column in &mut self.columns {
-            column.step(dt)?;
+        for (k, column) in self.columns.iter_mut().enumerate() {
+            let told = |error| match self.sides.iter().find(|side| side.column == k) {
+                Some(side) => on_side(side.hand, side.x, error),
+                None => error,
+            };
+            column.step(dt).map_err(told)?;
         }
         for side in &mut self.sides {
             let traction = self.columns[side.column].present().base_traction;
@@ -312,23 +322,34 @@ impl FreeField {
     pub fn bytes(&self) -> usize {
         let side = |side: &TiedSide| {
             side.dashpots.bytes()
+                + side.trace.bytes()
+                + size_of_val(side.targets.as_slice())
+                + size_of_val(side.tables.nodes.as_slice())
+                + size_of_val(side.tables.base.as_slice())
                 + side.tables.stress.bytes()
                 + side.tables.pressure.bytes()
                 + size_of_val(side.reference.as_slice())
                 + size_of_val(side.reference_water.as_slice())
-                + 2 * size_of_val(side.force.as_slice())
+                + size_of_val(side.force.as_slice())
         };
         self.columns.iter().map(Column::bytes).sum::<usize>() + self.sides.iter().map(side).sum::<usize>()
     }
 }
 
-fn renumbered<T: Copy>(
-    rows: &BTreeMap<usize, Vec<(u32, T)>>,
-    number: impl Fn(u32) -> u32,
-) -> BTreeMap<usize, Vec<(u32, T)>> {
-    let renumber =
-        |entries: &Vec<(u32, T)>| entries.iter().map(|&(column, weight)| (number(column), weight)).collect();
-    rows.iter().map(|(&row, entries)| (row, renumber(entries))).collect()
+/// Rows of the column as velocities lent from index `first` on.
+fn renumbered<T>(mut rows: BTreeMap<usize, Vec<(u32, T)>>, first: u32) -> BTreeMap<usize, Vec<(u32, T)>> {
+    for (column, _) in rows.values_mut().flatten() {
+        *column += first;
+    }
+    rows
+}
+
+/// An error of the column at a side, told with its place.
+fn on_side(hand: Hand, x: f64, mut error: SolverError) -> SolverError {
+    if let SolverError::Diverged { x: told, .. } = &mut error {
+        *told = x;
+    }
+    SolverError::Column { side: hand.name(), source: Box::new(error) }
 }
 
 impl TiedSide {

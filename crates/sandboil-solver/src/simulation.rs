@@ -343,7 +343,7 @@ impl Simulation {
         }
         let outline = self.present_outline();
         let section = self.section(&outline);
-        let free_field = match free_field {
+        let mut free_field = match free_field {
             Some(mut free_field) => {
                 free_field.begin_shaking(&section, &stage)?;
                 Some(free_field)
@@ -356,7 +356,7 @@ impl Simulation {
         if let (Some(flow), Some(excess)) = (&mut self.flow, excess) {
             flow.excess = excess;
         }
-        if let Some(free_field) = &free_field {
+        if let Some(free_field) = &mut free_field {
             self.set_guests(free_field.guests());
             free_field.tie(&mut self.geometry, self.model.nodes());
         }

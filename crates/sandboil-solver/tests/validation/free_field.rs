@@ -2,15 +2,15 @@
 
 use crate::{
     common::{column, elastic, shaking},
+    stages::at_rest,
     waves::ricker,
 };
-use sandboil_solver::{Gravity, Model, Region, Shaking, Side, Simulation, Support, UpgoingWave, Water};
+use sandboil_solver::{Base, Model, Region, Shaking, Side, Support, UpgoingWave, Water};
 
 const HEIGHT: f64 = 10.0;
 const SPACING: f64 = 0.2;
 const COLUMNS: usize = 25;
 const WATER: Water = Water { unit_weight: 10.0, bulk_modulus: 1e6 };
-const GRAVITY_STAGE: Gravity = Gravity { tolerance: 1e-5, max_steps: 20_000 };
 /// Wave speed 100 m/s at 2 Mg/m3.
 const SHEAR_MODULUS: f64 = 2e4;
 
@@ -21,13 +21,6 @@ pub fn block(height: f64, spacing: f64, columns: usize, region: Region, water: O
     model.outline.sides = [side(0.0), side(columns as f64 * spacing)];
     model.period = None;
     model
-}
-
-fn at_rest(model: &Model) -> Simulation {
-    let mut simulation = Simulation::new(model, 1).unwrap();
-    simulation.begin_gravity(GRAVITY_STAGE).unwrap();
-    assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
-    simulation
 }
 
 fn pulse(frequency: f64, amplitude: f64) -> UpgoingWave {
@@ -100,7 +93,7 @@ fn a_recorded_column_does_what_the_solved_one_did() {
     let short = Shaking { column_records: records.clone(), duration: 1.0, ..stage.clone() };
     assert!(replayed.begin_shaking(short).is_err());
     let mut replayed = at_rest(&model);
-    replayed.begin_shaking(Shaking { column_records: records, ..stage }).unwrap();
+    replayed.begin_shaking(Shaking { column_records: records, ..stage.clone() }).unwrap();
     let (mut peak, mut apart) = (0.0_f64, 0.0_f64);
     for then in &velocities {
         replayed.advance(1, f64::INFINITY).unwrap();
@@ -109,6 +102,20 @@ fn a_recorded_column_does_what_the_solved_one_did() {
             apart = apart.max((now[0] - then[0]).hypot(now[1] - then[1]));
         }
     }
+    // A second stage reads its own record, and is refused without.
+    let again = Shaking { base: Base::shaken_by(Some(pulse(5.0, -0.1))), ..stage.clone() };
+    solved.begin_shaking(Shaking { record_columns: Some(INTERVAL), ..again.clone() }).unwrap();
+    solved.advance(u64::MAX, f64::INFINITY).unwrap();
+    let column_records = solved.take_column_records();
+    let mut forgotten = at_rest(&model);
+    forgotten.begin_shaking(Shaking { column_records: column_records.clone(), ..stage }).unwrap();
+    assert!(forgotten.begin_shaking(again.clone()).is_err());
+    replayed.begin_shaking(Shaking { column_records, ..again }).unwrap();
+    replayed.advance(u64::MAX, f64::INFINITY).unwrap();
+    let (then, now) = (solved.velocity(), replayed.velocity());
+    let second = then.iter().zip(&now).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
+    println!("second stage: {:.3} % of the peak", 100.0 * second / peak);
+    assert!(second < 0.005 * peak, "{second} {peak}");
     println!("frames every {INTERVAL} s: {:.3} % of the peak", 100.0 * apart / peak);
     assert!(apart < 0.005 * peak, "{apart} {peak}");
 }

@@ -23,7 +23,8 @@ fn sand_column(operators: Operators) -> Model {
     model
 }
 
-fn at_rest(model: &Model) -> Simulation {
+/// The section after the gravity stage.
+pub fn at_rest(model: &Model) -> Simulation {
     let mut simulation = Simulation::new(model, 1).unwrap();
     simulation.begin_gravity(GRAVITY_STAGE).unwrap();
     assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
