@@ -50,8 +50,8 @@ def test_the_page_tells_what_is_on_and_why() -> None:
     text = str(scenes.column().plan())
     for told in (
         "nodes         32",
-        "on   pore water            water table at elevation 4 m",
-        "off  free-field columns    the sides are periodic",
+        "on   pore water             water table at elevation 4 m",
+        "off  free-field columns     the sides are periodic",
         "limited by the",
         "ms a step in a trial of",
         "memory",

@@ -94,12 +94,13 @@ class Plan:
 
     def __str__(self) -> str:
         dx, dy = self.spacing
+        width = max(len(name) for name, _, _ in self.physics)
         lines = [
             f"nodes         {self.nodes}, spacing {dx:g} x {dy:g} m",
             f"stress nodes  {self.stress_nodes}, {self.pairs} pairs with nodes",
             "",
             "physics",
-            *(f"  {'on ' if on else 'off'}  {name:<20}  {reason}" for name, on, reason in self.physics),
+            *(f"  {'on ' if on else 'off'}  {name:<{width}}  {reason}" for name, on, reason in self.physics),
             "",
             "stages",
             *(f"  {line}" for stage in self.stages for line in _stage_lines(stage)),
