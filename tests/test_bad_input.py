@@ -361,16 +361,16 @@ CASES: dict[str, tuple[Change, str, object, str, str | None]] = {
     ),
     "water table in the ground": (
         setting("water_table", {"depth": 2.0}),
-        "scene.water_table.depth",
-        2.0,
-        "must be at the highest ground, elevation 10 m, or above",
-        "partly saturated soil is not modelled",
+        "scene.regions[0].retention",
+        None,
+        "is required of soil above the water table",
+        "above='dry'",
     ),
     "water table twice": (
         setting("water_table", {"depth": 0.0, "elevation": 10.0}),
         "scene.water_table",
-        {"elevation": 10.0, "depth": 0.0},
-        "exactly one of elevation and depth",
+        {"elevation": 10.0, "depth": 0.0, "points": None},
+        "exactly one of elevation, depth and points",
         None,
     ),
     "water without a table": (
@@ -398,7 +398,7 @@ CASES: dict[str, tuple[Change, str, object, str, str | None]] = {
         setting("stages", [{"kind": "gravity"}, {"kind": "gravity"}]),
         "scene.stages[1].kind",
         "gravity",
-        "must be the first stage only",
+        "must come before all shaking, and only once",
         None,
     ),
     "no end to standing still": (

@@ -75,7 +75,7 @@ def test_example_is_the_site_of_the_paper() -> None:
     ]
     assert all((r.Gs, r.K0, r.hydraulic_conductivity) == (2.67, 0.5, 1.0e-3) for r in scene.regions)
     assert scene.water == Water(unit_weight=10.0, bulk_modulus=1.0e6)
-    assert scene.water_level == 20.0
+    assert scene.water_level_at(np.array([0.5])) == 20.0
     # The reference's base: saturated density 2.100 Mg/m3 under nu 1/3 statics.
     assert scene.regions[2].resolved(scene).saturated_density == pytest.approx(2.100, abs=5e-4)
     assert scene.regions[2].initial_poisson_ratio == pytest.approx(1.0 / 3.0)
@@ -354,10 +354,10 @@ def test_water_level_and_stage_names() -> None:
         water_table=WaterTable(depth=-3.0),
         stages=[Gravity(), Shaking(duration=1.0), Shaking(duration=2.0)],
     )
-    assert scene.water_level == 13.0
+    assert scene.water_level_at(np.array([0.5])) == 13.0
     assert scene.bounds == (0.0, 0.0, 1.0, 10.0)
     assert scene.stage_names == ["gravity", "shaking", "shaking_2"]
-    assert dry_column(dry_unit_weight=18.0).water_level is None
+    assert dry_column(dry_unit_weight=18.0).water_level_at(np.array([0.5])) == -np.inf
 
 
 def test_only_what_the_scene_requires_is_active() -> None:

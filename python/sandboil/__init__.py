@@ -10,6 +10,18 @@ from ._errors import InvalidInput, RunInterrupted, SandboilError, SandboilWarnin
 from ._motion_spec import MotionSpec
 from .boundaries import BaseSegment, CompliantBase, Fixed, FreeField, Periodic, Roller, Sides
 from .discretise import Discretisation, discretise
+from .hydraulics import (
+    Conductivity,
+    Drain,
+    Flux,
+    Head,
+    Pressure,
+    Rain,
+    Reservoir,
+    Seepage,
+    SeepageFace,
+    VanGenuchten,
+)
 from .materials import DruckerPrager, Elastic, MohrCoulomb, PM4Sand, PressureElastic, TotalStress
 from .motion import Motion, ResponseSpectrum, response_spectrum
 from .plan import Plan
@@ -37,13 +49,17 @@ __all__ = [
     "BaseSegment",
     "Box",
     "CompliantBase",
+    "Conductivity",
     "Discretisation",
+    "Drain",
     "DruckerPrager",
     "Elastic",
     "Fixed",
+    "Flux",
     "FreeField",
     "Gravity",
     "HalfSpace",
+    "Head",
     "History",
     "InvalidInput",
     "ModulusCurve",
@@ -56,10 +72,13 @@ __all__ = [
     "Periodic",
     "Plan",
     "Polygon",
+    "Pressure",
     "PressureElastic",
     "Profile",
+    "Rain",
     "Rayleigh",
     "Region",
+    "Reservoir",
     "ResponseSpectrum",
     "Roller",
     "Run",
@@ -67,6 +86,8 @@ __all__ = [
     "SandboilError",
     "SandboilWarning",
     "Scene",
+    "Seepage",
+    "SeepageFace",
     "Shaking",
     "Sides",
     "Simulation",
@@ -76,6 +97,7 @@ __all__ = [
     "Summary",
     "Surface",
     "TotalStress",
+    "VanGenuchten",
     "Water",
     "WaterTable",
     "__version__",

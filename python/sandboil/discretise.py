@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from . import _core
 from ._errors import InvalidInput
 from .boundaries import COORDINATE_TOLERANCE, Periodic
 from .scene import Scene
@@ -33,9 +35,10 @@ class Overburden:
     unit_weights: Floats
     section: shapely.Geometry
     bounds: tuple[float, float, float, float]
-    water_level: float | None
+    water_level: Callable[[Floats], Floats] | None
     water_unit_weight: float
     is_periodic: bool
+    pore_water: PoreWater | None = None
 
     @classmethod
     def of(cls, scene: Scene) -> Overburden:
@@ -47,7 +50,7 @@ class Overburden:
             unit_weights=scene.gravity * np.array(densities),
             section=scene.section,
             bounds=scene.bounds,
-            water_level=scene.water_level,
+            water_level=None if scene.water is None else scene.water_level_at,
             water_unit_weight=0.0 if scene.water is None else scene.water.unit_weight,
             is_periodic=isinstance(scene.sides, Periodic),
         )
@@ -59,10 +62,12 @@ class Overburden:
         return tops[column]
 
     def pore_pressure(self, points: Floats) -> Floats:
-        """Hydrostatic pressure at points (n, 2), kPa; zero above the water and in a dry scene."""
+        """Pressure at rest at points (n, 2), kPa: zero in a dry scene, else that of the pore water."""
         if self.water_level is None:
             return np.zeros(len(points))
-        return self.water_unit_weight * np.maximum(self.water_level - points[:, 1], 0.0)
+        if self.pore_water is not None:
+            return self.pore_water.state(points)[0]
+        return self.water_unit_weight * np.maximum(self.water_level(points[:, 0]) - points[:, 1], 0.0)
 
     def stress_at(self, points: Floats) -> tuple[Floats, Floats]:
         """Vertical effective stress and pore pressure at points (n, 2), kPa, each of shape (n,)."""
@@ -82,10 +87,19 @@ class Overburden:
                 bottom[line[chosen]], top[line[chosen]] = extents[chosen, 1], extents[chosen, 3]
                 total += unit_weight * np.maximum(top[column] - np.maximum(bottom[column], y), 0.0)
         pressure = self.pore_pressure(points)
-        if self.water_level is not None:
-            pond = np.maximum(self.water_level - np.maximum(self.surface_elevation(x), y), 0.0)
+        if self.pore_water is not None:
+            surface = self.surface_elevation(x)
+            # Where water stands on the ground its weight is the pressure there.
+            pond = np.maximum(self.pore_water.state(np.column_stack([x, surface]))[0], 0.0)
+            total += np.where(y < surface, pond, np.maximum(pressure, 0.0))
+        elif self.water_level is not None:
+            pond = np.maximum(self.water_level(x) - np.maximum(self.surface_elevation(x), y), 0.0)
             total += self.water_unit_weight * pond
-        return total - pressure, pressure
+        if self.pore_water is None:
+            return total - pressure, pressure
+        # Bishop's stress: pores that hold air push with their share.
+        _, saturation = self.pore_water.state(points)
+        return total - self.pore_water.missing_weight(points) - saturation * pressure, pressure
 
     def _verticals(self, x: Floats) -> tuple[NDArray[np.object_], NDArray[np.intp]]:
         """One vertical line through the whole section per distinct x, and the line of each point.
@@ -110,6 +124,71 @@ class Overburden:
 
 
 @dataclass(frozen=True)
+class PoreWater:
+    """Pressure and saturation of nodes, read between them: heads and saturations are the nearest node's.
+
+    Attributes
+    ----------
+    position : (n, 2) m
+    pressure : (n,) kPa, compression positive, suction negative
+    saturation : (n,)
+    missing : (n,) kPa, weight of the water that pores above a node lack
+    density : (n,) kN/m3, weight of the water that pores at a node lack, per volume of soil
+    unit_weight : of water, kN/m3
+    """
+
+    position: Floats
+    pressure: Floats
+    saturation: Floats
+    missing: Floats
+    density: Floats
+    unit_weight: float
+
+    @classmethod
+    def of(
+        cls,
+        position: Floats,
+        pressure: Floats,
+        saturation: Floats,
+        porosity: Floats,
+        unit_weight: float,
+        dy: float,
+    ) -> PoreWater:
+        """Pore water of nodes on a lattice of rows `dy` apart."""
+        density = unit_weight * porosity * (1.0 - saturation)
+        missing = np.zeros(len(position))
+        _, column = np.unique(np.round(position[:, 0] / COORDINATE_TOLERANCE), return_inverse=True)
+        # From the top of every column down: what lies above a node, and half of its own cell.
+        order = np.lexsort((-position[:, 1], column))
+        weight = dy * density[order]
+        total = np.cumsum(weight)
+        first = np.searchsorted(column[order], column[order])
+        missing[order] = total - 0.5 * weight - (total[first] - weight[first])
+        return cls(position, pressure, saturation, missing, density, unit_weight)
+
+    def state(self, points: Floats) -> tuple[Floats, Floats]:
+        """Pressure (kPa) and degree of saturation at points (m, 2)."""
+        nearest, above = self._nearest(points)
+        # Within a cell the head is that of its node.
+        held = np.where(self.saturation[nearest] > 0.0, self.unit_weight * above, 0.0)
+        return self.pressure[nearest] + held, self.saturation[nearest]
+
+    def missing_weight(self, points: Floats) -> Floats:
+        """Weight that the soil above points (m, 2) lacks for being saturated, kPa."""
+        nearest, above = self._nearest(points)
+        weight: Floats = np.maximum(self.missing[nearest] + self.density[nearest] * above, 0.0)
+        return weight
+
+    def _nearest(self, points: Floats) -> tuple[NDArray[np.intp], Floats]:
+        """The node nearest to each point, and how far above the point it lies, m."""
+        # Imported by those who need it: it costs a quarter of a second.
+        from scipy.spatial import cKDTree
+
+        _, nearest = cKDTree(self.position).query(points)
+        return nearest, self.position[nearest, 1] - points[:, 1]
+
+
+@dataclass(frozen=True)
 class Discretisation:
     """Particles (velocity nodes) of a scene, row by row from the bottom, left to right in each row.
 
@@ -122,7 +201,8 @@ class Discretisation:
     surface_elevation : (n,) elevation of the ground above each node, m
     volume : (n,) m3 per metre of thickness
     sigma_v_eff0 : (n,) geostatic vertical effective stress, kPa, compression positive
-    pore_pressure0 : (n,) hydrostatic, kPa, compression positive
+    pore_pressure0 : (n,) at rest, kPa, compression positive; hydrostatic, or that of a seepage stage
+    saturation0 : (n,) degree of saturation at rest; None if all pores are full
     porosity0 : (n,)
     dry_density, solid_density : (n,) Mg/m3
     overburden : the geostatic state from which the two stresses come
@@ -136,6 +216,7 @@ class Discretisation:
     volume: Floats
     sigma_v_eff0: Floats
     pore_pressure0: Floats
+    saturation0: Floats | None
     porosity0: Floats
     dry_density: Floats
     solid_density: Floats
@@ -144,6 +225,22 @@ class Discretisation:
     def stress_at(self, points: Floats) -> tuple[Floats, Floats]:
         """Geostatic (sigma_v_eff, pore_pressure) at points (m, 2), kPa, compression positive, each (m,)."""
         return self.overburden.stress_at(np.asarray(points, dtype=np.float64))
+
+    def with_pore_water(self, pressure: Floats, saturation: Floats) -> Discretisation:
+        """The same section with other pore water, (n,) kPa and (n,): its stresses at rest follow."""
+        unit_weight = self.overburden.water_unit_weight
+        water = PoreWater.of(
+            self.position, pressure, saturation, self.porosity0, unit_weight, self.spacing[1]
+        )
+        overburden = replace(self.overburden, pore_water=water)
+        sigma_v_eff, _ = overburden.stress_at(self.position)
+        return replace(
+            self,
+            overburden=overburden,
+            sigma_v_eff0=sigma_v_eff,
+            pore_pressure0=pressure,
+            saturation0=saturation if (saturation < 1.0).any() else None,
+        )
 
 
 def discretise(scene: Scene) -> Discretisation:
@@ -187,7 +284,7 @@ def discretise(scene: Scene) -> Discretisation:
     soils = [region.resolved(scene) for region in scene.regions]
     overburden = Overburden.of(scene)
     sigma_v_eff, pressure = overburden.stress_at(position)
-    return Discretisation(
+    particles = Discretisation(
         position=position,
         region=region_index,
         spacing=(dx, dy),
@@ -196,8 +293,32 @@ def discretise(scene: Scene) -> Discretisation:
         volume=np.full(len(position), dx * dy),
         sigma_v_eff0=sigma_v_eff,
         pore_pressure0=pressure,
+        saturation0=None,
         porosity0=np.array([soil.porosity for soil in soils])[region_index],
         dry_density=np.array([soil.dry_density for soil in soils])[region_index],
         solid_density=np.array([soil.solid_density for soil in soils])[region_index],
         overburden=overburden,
     )
+    return (
+        particles.with_pore_water(*_water_at_rest(scene, particles))
+        if scene.is_partly_saturated
+        else particles
+    )
+
+
+def _water_at_rest(scene: Scene, particles: Discretisation) -> tuple[Floats, Floats]:
+    """Pressure (kPa) and saturation of the nodes over and under a still water table."""
+    assert scene.water is not None
+    assert scene.water_table is not None
+    x, y = particles.position.T
+    pressure = scene.water.unit_weight * (scene.water_level_at(x) - y)
+    saturation = np.ones(len(y))
+    for index, region in enumerate(scene.regions):
+        above = (particles.region == index) & (pressure < 0.0)
+        if scene.water_table.above == "dry" and scene.seepage is None:
+            pressure[above] = saturation[above] = 0.0
+        elif region.retention is not None:
+            saturation[above] = _core.saturation(
+                region.retention.core, pressure[above] / scene.water.unit_weight
+            )
+    return pressure, saturation

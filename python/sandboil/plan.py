@@ -13,10 +13,11 @@ from . import _core
 from ._errors import SandboilWarning
 from ._motion_spec import MotionSpec
 from .discretise import discretise
+from .hydraulics import Seepage
 from .motion import Motion
 from .motion._motion import SIGNIFICANT
-from .scene import Gravity, Scene, Shaking
-from .simulation import LOOK_INTERVAL, Simulation, doubts, loaded_motions
+from .scene import Scene, Shaking
+from .simulation import LOOK_INTERVAL, VECTOR_FIELDS, Simulation, doubts, loaded_motions, written_fields
 
 # Wall time for which each stage is tried, s: long enough for thousands of steps of a column.
 TRIAL_SECONDS = 1.5
@@ -205,9 +206,11 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
         while not done and time.perf_counter() < trial_end:
             done = simulation.advance(np.inf, LOOK_INTERVAL)
         spent, made = time.perf_counter() - start, simulation.steps
-        duration = None if isinstance(stage, Gravity) else scene.duration(stage)
+        duration = scene.duration(stage)
         step_time = spent / max(made, 1)
-        steps = made if done else None if duration is None else round(duration / dt)
+        # Steps of a seepage stage grow as it goes.
+        untold = duration is None or isinstance(stage, Seepage)
+        steps = made if done else None if untold or duration is None else round(duration / dt)
         stages.append(
             StagePlan(
                 name=scene.stage_names[index],
@@ -282,7 +285,7 @@ def _cut_at(begin: float) -> Callable[[MotionSpec], MotionSpec]:
 def _file_size(scene: Scene, simulation: Simulation, stages: list[StagePlan]) -> int:
     """Bytes of the frames and histories of a whole run, uncompressed."""
     duration = sum(stage.duration for stage in stages if stage.duration is not None)
-    components = 3 + sum(3 if simulation.field(name).ndim == 2 else 1 for name in simulation.field_names)
+    components = 3 + sum(3 if name in VECTOR_FIELDS else 1 for name in written_fields(scene))
     frames = duration / scene.output.field_dt + len(stages)
     samples = duration / scene.output.history_dt
     channels = len(simulation.take_histories()[1]) * len(simulation.probes)

@@ -41,11 +41,13 @@ from .simulation import (
     FIELDS,
     HISTORIES,
     STRESS_HISTORIES,
+    VECTOR_FIELDS,
     WATER_FIELDS,
     Probe,
     Simulation,
     pore_pressure_ratio,
     unknown_name,
+    written_fields,
 )
 
 FILE_NAME = "results.h5"
@@ -161,8 +163,8 @@ class Writer:
         # Written once, read by every frame: its offset stays zero.
         data["region"] = self._file["nodes/region"]
         _growing(offsets, "region", (_ROWS_PER_CHUNK,), "1", np.int64)
-        for name in self._simulation.field_names:
-            shape = (nodes, 3) if self._simulation.field(name).ndim == 2 else (nodes,)
+        for name in written_fields(self._simulation.scene):
+            shape = (nodes, 3) if name in VECTOR_FIELDS else (nodes,)
             dataset = _growing(data, name, shape, FIELDS[name].unit)
             dataset.attrs["description"] = FIELDS[name].description
             _growing(offsets, name, (_ROWS_PER_CHUNK,), "1", np.int64)
@@ -181,12 +183,26 @@ class Writer:
         """Take note of the stage that the simulation has just begun."""
         simulation = self._simulation
         stage = self._file.create_group(f"stages/{simulation.stage}")
+        if simulation.stage == "gravity" and simulation.scene.seepage is not None:
+            self._follow_seepage()
         stage.attrs["flow_scheme"] = simulation.flow_scheme
         stage.attrs["duration_s"] = np.nan if simulation.duration is None else simulation.duration
         if simulation.base_impedance is not None:
             stage.attrs["base_impedance_kPa_s_per_m"] = simulation.base_impedance
         for name, size in simulation.arrays().items():
             stage.attrs[f"bytes_{name}"] = size
+
+    def _follow_seepage(self) -> None:
+        """Write the state at rest anew: the water that a seepage stage has left."""
+        particles = self._simulation.particles
+        at_probes = particles.stress_at(self._file["probes/position"][:])
+        for place, values in (
+            ("nodes/sigma_v_eff0", particles.sigma_v_eff0),
+            ("nodes/pore_pressure0", particles.pore_pressure0),
+            ("probes/sigma_v_eff0", at_probes[0]),
+            ("probes/pore_pressure0", at_probes[1]),
+        ):
+            _replace(self._file, place, values, "kPa")
 
     def end_stage(self) -> None:
         """Make the time of the frames to come count on from the end of the present stage."""
@@ -199,7 +215,8 @@ class Writer:
         `wall_time` (s) is that of the stage so far.
         """
         simulation = self._simulation
-        if frame:
+        # Water that flows before the grains may move has other fields than they: its end is their beginning.
+        if frame and simulation.field_names == written_fields(simulation.scene):
             self._append_frame(wall_time)
         self._append_histories()
         for kept in simulation.scene.output.envelopes:
@@ -212,6 +229,12 @@ class Writer:
         stage.attrs["wall_time_s"] = wall_time
         for name, count in simulation.counters().items():
             stage.attrs[f"count_{name}"] = count
+        if simulation.stage == "seepage":
+            discharge = np.array([inflow for _, inflow in simulation.discharge])
+            _replace(self._file, "seepage/discharge", discharge, "m3/s per m")
+            if (balance := simulation.water_balance) is not None:
+                _replace(self._file, "seepage/inflow", np.array(balance[0]), "m3 per m")
+                self._file["seepage"].attrs["stored_m3_per_m"] = balance[1]
         self._file.flush()
 
     def _append_frame(self, wall_time: float) -> None:
@@ -219,8 +242,9 @@ class Writer:
         vtk, frames = self._file["VTKHDF"], self._file["frames"]
         steps = vtk["Steps"]
         first = self._frames * len(simulation.particles.position)
-        fields = simulation.fields(simulation.field_names)
-        _append(vtk["Points"], _with_depth(simulation.particles.position + fields["displacement"]))
+        fields = simulation.fields(written_fields(simulation.scene))
+        position = simulation.particles.position + fields.get("displacement", 0.0)
+        _append(vtk["Points"], _with_depth(position))
         for name, values in fields.items():
             _append(vtk["PointData"][name], _with_depth(values) if values.ndim == 2 else values)
             _append(steps["PointDataOffsets"][name], [first])
@@ -539,7 +563,7 @@ class Run:
     @property
     def field_names(self) -> list[str]:
         """Names that :meth:`field` knows in this run."""
-        return [name for name in FIELDS if self.scene.water is not None or name not in WATER_FIELDS]
+        return written_fields(self.scene)
 
     @property
     def times(self) -> Floats:

@@ -234,10 +234,13 @@ class Bar:
     def update(self, simulation: Simulation) -> None:
         """Show how far the stage has come."""
         if simulation.duration is None:
-            stage = simulation.scene.stages[0]
-            assert isinstance(stage, Gravity)
-            told = f"unbalanced {simulation.residual:.1e} of gravity, {stage.tolerance:.0e} wanted"
-            # Nobody knows how far rest is: the row fills when it is reached.
+            stage = simulation.present_stage
+            told = (
+                f"unbalanced {simulation.residual:.1e} of gravity, {stage.tolerance:.0e} wanted"
+                if isinstance(stage, Gravity)
+                else f"iteration {simulation.steps}"
+            )
+            # Nobody knows how far rest or the steady state is: the row fills when it is reached.
             total = 1.0 if simulation.stage_is_complete else None
             self.progress.update(self._row, told=told, total=total, completed=1.0 if total else 0.0)
         else:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from pydantic import Field, StrictBool, model_validator
 from shapely.geometry.base import BaseGeometry
 
@@ -30,7 +31,18 @@ from .boundaries import (
     Point,
     Sides,
 )
-from .materials import Elastic, Material, NonNegative, PM4Sand, Positive
+from .hydraulics import (
+    REFERENCES,
+    AnyConductivity,
+    Conductivity,
+    Drain,
+    Seepage,
+    Series,
+    VanGenuchten,
+    heads_of,
+    series_of,
+)
+from .materials import Elastic, Material, PM4Sand, Positive
 from .outline import Outline
 
 if TYPE_CHECKING:
@@ -152,8 +164,10 @@ class Region(Model):
 
     Densities: any sufficient set of `Gs`, `porosity` or `void_ratio`, and unit weights in kN/m3. PM4Sand's
     void ratio comes from its relative density. `bulk_unit_weight` is that of the soil as it stands: saturated
-    in a scene with water, dry in one without. Without `hydraulic_conductivity` (isotropic, m/s) the region is
-    undrained. `K0` is the ratio of horizontal to vertical effective stress that the gravity stage aims at.
+    in a scene with water, dry in one without. Without `hydraulic_conductivity` (m/s, or a
+    :class:`Conductivity` that differs with direction) the region is undrained. `retention` tells what it
+    holds above the water table. `K0` is the ratio of horizontal to vertical effective stress that the gravity
+    stage aims at.
     """
 
     _label: ClassVar[str] = "region"
@@ -162,8 +176,11 @@ class Region(Model):
     name: str = Field(min_length=1)
     shape: Shape
     material: Material
-    hydraulic_conductivity: NonNegative | None = Field(
-        default=None, description="isotropic, m/s; none: undrained"
+    hydraulic_conductivity: AnyConductivity | None = Field(
+        default=None, description="m/s, the same in all directions or a Conductivity; none: undrained"
+    )
+    retention: VanGenuchten | None = Field(
+        default=None, description="what it holds above the water table; none: all pores stay full"
     )
     Gs: Annotated[Number, Field(gt=1.0)] | None = Field(
         default=None, description="specific gravity of the solids"
@@ -193,7 +210,8 @@ class Region(Model):
             shape: Box | Polygon,
             material: Material,
             *,
-            hydraulic_conductivity: float | None = None,
+            hydraulic_conductivity: float | Conductivity | None = None,
+            retention: VanGenuchten | None = None,
             Gs: float | None = None,
             porosity: float | None = None,
             void_ratio: float | None = None,
@@ -207,6 +225,12 @@ class Region(Model):
     def geometry(self) -> BaseGeometry:
         """The region as a shapely polygon."""
         return self.shape.geometry
+
+    @property
+    def conductivity(self) -> tuple[float, float, tuple[float, float]]:
+        """Largest and smallest hydraulic conductivity, m/s, and the direction of the largest."""
+        given = self.hydraulic_conductivity or 0.0
+        return given.core if isinstance(given, Conductivity) else (given, given, (1.0, 0.0))
 
     @property
     def initial_poisson_ratio(self) -> float:
@@ -332,21 +356,36 @@ class Water(Model):
 
 
 class WaterTable(Model):
-    """Level of still water by elevation or by depth below the highest ground, m; above it, a pond."""
+    """Level of still water by elevation, by depth below the highest ground, or by `points` (x, y), m.
+
+    Above the ground it is a pond. Where it lies below the ground, soil `above` it is "dry", or holds water by
+    its "retention" curve under the suction of its height; left out, the latter if all soil there has a curve.
+    """
 
     _label: ClassVar[str] = "water_table"
 
     elevation: Number | None = Field(default=None, description="m")
     depth: Number | None = Field(default=None, description="below the highest ground, m")
+    points: Annotated[Many[Point], Field(min_length=2)] | None = Field(
+        default=None, description="(x, y) from left to right, m; level beyond its ends"
+    )
+    above: Literal["dry", "retention"] | None = None
 
     @model_validator(mode="after")
     def _one_level(self) -> WaterTable:
-        if (self.elevation is None) == (self.depth is None):
+        said = {"elevation": self.elevation, "depth": self.depth, "points": self.points}
+        if sum(value is not None for value in said.values()) != 1:
             raise InvalidInput(
                 "water_table",
-                {"elevation": self.elevation, "depth": self.depth},
-                "must be given by exactly one of elevation and depth",
+                said,
+                "must be given by exactly one of elevation, depth and points",
             )
+        if self.points is not None:
+            for i, (before, after) in enumerate(itertools.pairwise(self.points)):
+                if not after[0] > before[0]:
+                    raise InvalidInput(
+                        f"water_table.points[{i + 1}]", after, "must lie to the right of the point before it"
+                    )
         return self
 
 
@@ -505,7 +544,7 @@ class Shaking(Model):
         return self.model_copy(update=update)
 
 
-Stage = Annotated[Gravity | Shaking, Field(discriminator="kind")]
+Stage = Annotated[Gravity | Shaking | Seepage, Field(discriminator="kind")]
 
 
 class Output(Model):
@@ -619,6 +658,7 @@ class Scene(Model):
         self._check_section()
         self._check_spacing()
         self._check_water()
+        self._check_seepage()
         self._check_densities()
         self._check_materials()
         self._check_stages()
@@ -776,16 +816,137 @@ class Scene(Model):
                 "is required when there is water",
                 "WaterTable(depth=0) is at the surface",
             )
-        level, top = self.water_level, self.bounds[3]
-        if level is not None and level < top - COORDINATE_TOLERANCE:
-            assert self.water_table is not None
-            name = "elevation" if self.water_table.elevation is not None else "depth"
+        if self.water_table is not None and self.water_table.above != "dry":
+            for i, region in self._regions_above_water():
+                if region.retention is None and self.seepage is None:
+                    raise InvalidInput(
+                        f"scene.regions[{i}].retention",
+                        None,
+                        f"is required of soil above the water table (region {region.name!r})",
+                        "VanGenuchten(alpha=14.5, n=2.68) is a sand; or WaterTable(..., above='dry')",
+                    )
+
+    def _regions_above_water(self) -> list[tuple[int, Region]]:
+        """Regions of which a part lies above the water table, with their places."""
+        found = []
+        for i, region in enumerate(self.regions):
+            corners = shapely.get_coordinates(region.geometry)
+            # Between its corners the water table may bend too.
+            xs = [x for x, _ in (self.water_table.points or ())] if self.water_table else []
+            x0, y0, x1, y1 = region.geometry.bounds
+            for x in xs:
+                if x0 < x < x1:
+                    line = region.geometry.intersection(shapely.LineString([(x, y0), (x, y1)]))
+                    if not line.is_empty:
+                        corners = np.vstack([corners, [(x, line.bounds[3])]])
+            if (corners[:, 1] > self.water_level_at(corners[:, 0]) + COORDINATE_TOLERANCE).any():
+                found.append((i, region))
+        return found
+
+    def _check_seepage(self) -> None:
+        for i, stage in enumerate(self.stages):
+            if not isinstance(stage, Seepage):
+                continue
+            path = f"scene.stages[{i}]"
+            if i > 0:
+                raise InvalidInput(
+                    f"{path}.kind", "seepage", "must be the first stage: the ground is at rest"
+                )
+            if self.water is None:
+                raise InvalidInput("scene.water", None, "is required by a seepage stage", "water = Water()")
+            if not any(region.conductivity[0] for region in self.regions):
+                raise InvalidInput(
+                    "scene.regions",
+                    [r.name for r in self.regions],
+                    "must hold one with hydraulic_conductivity",
+                )
+            if stage.duration is None and not any(c.kind in REFERENCES for c in stage.conditions):
+                raise InvalidInput(
+                    f"{path}.conditions",
+                    [c.kind for c in stage.conditions],
+                    "must tell the pressure somewhere: with fluxes alone no state is steady, or any level is",
+                    "a Head, a Reservoir, a SeepageFace, or a duration",
+                )
+            for k, condition in enumerate(stage.conditions):
+                self._check_condition(stage, condition, f"{path}.conditions[{k}]")
+            self._check_desaturation(stage, path)
+
+    def _check_condition(self, stage: Seepage, condition: Any, path: str) -> None:
+        line = self.condition_line(condition)
+        if isinstance(condition, Drain):
+            if not shapely.buffer(self.section, COORDINATE_TOLERANCE).covers(line):
+                raise InvalidInput(f"{path}.points", condition.points, "must lie in the section")
+        elif line.is_empty or line.length <= COORDINATE_TOLERANCE:
             raise InvalidInput(
-                f"scene.water_table.{name}",
-                getattr(self.water_table, name),
-                f"must be at the highest ground, elevation {top:g} m, or above",
-                "partly saturated soil is not modelled; leave water and water_table out for a dry section",
+                f"{path}.{'x' if condition.x else 'on'}",
+                condition.x or condition.on,
+                "must cover a stretch of the section's edge",
+                f"the section reaches from x = {self.bounds[0]:g} to {self.bounds[2]:g} m",
             )
+        elif not isinstance(condition.on, str):
+            away = shapely.distance(shapely.points(condition.on), self.section.exterior)
+            if (away > self.spacing).any():
+                raise InvalidInput(
+                    f"{path}.on[{int(np.argmax(away))}]",
+                    condition.on[int(np.argmax(away))],
+                    f"must lie on the edge of the section, it is {away.max():.3g} m away",
+                )
+        if isinstance(self.sides, Periodic) and getattr(condition, "on", None) in ("left", "right"):
+            raise InvalidInput(
+                f"{path}.on", condition.on, "does not go with periodic sides, which are no edges"
+            )
+        lowest = self.outline.base[:, 1].min()
+        if (told := heads_of(condition)) is not None:
+            name, values = told
+            for j, (_, value) in enumerate(values):
+                if value < lowest - COORDINATE_TOLERANCE:
+                    place = f"[{j}]" if len(values) > 1 else ""
+                    raise InvalidInput(
+                        f"{path}.{name}{place}",
+                        value,
+                        f"must not lie below the base, elevation {lowest:g} m",
+                        "heads are elevations in the section's own coordinates",
+                    )
+        last: Series = series_of(condition)
+        if stage.duration is None and len(last) > 1:
+            raise InvalidInput(
+                f"{path}", last, "must not change with time on the way to a steady state", "give a duration"
+            )
+
+    def _check_desaturation(self, stage: Seepage, path: str) -> None:
+        """Soil that heads leave above them must say what it holds."""
+        told = [told for condition in stage.conditions if (told := heads_of(condition)) is not None]
+        levels = [value for _, values in told for _, value in values]
+        level = min([*levels, float(self.water_level_at(np.array(self.bounds[0::2])).min())])
+        for i, region in enumerate(self.regions):
+            if region.retention is None and region.geometry.bounds[3] > level + self.spacing:
+                raise InvalidInput(
+                    f"scene.regions[{i}].retention",
+                    None,
+                    f"is required: region {region.name!r} reaches {region.geometry.bounds[3]:g} m, above the "
+                    f"head of {level:g} m",
+                    "VanGenuchten(alpha=14.5, n=2.68) is a sand",
+                )
+
+    def condition_line(self, condition: Any) -> BaseGeometry:
+        """The line on which a hydraulic condition holds."""
+        if isinstance(condition, Drain):
+            return shapely.LineString(condition.points)
+        outline, (x0, _, x1, _) = self.outline, self.bounds
+        if not isinstance(condition.on, str):
+            return shapely.LineString(condition.on)
+        lines = {
+            "surface": outline.surface,
+            "base": outline.base,
+            "left": [(x0, outline.left[0]), (x0, outline.left[1])],
+            "right": [(x1, outline.right[0]), (x1, outline.right[1])],
+        }
+        line = shapely.LineString(lines[condition.on])
+        if condition.x is None:
+            return line
+        y0, y1 = line.bounds[1] - 1.0, line.bounds[3] + 1.0
+        part = shapely.intersection(line, shapely.box(condition.x[0], y0, condition.x[1], y1))
+        return shapely.line_merge(part) if part.geom_type == "MultiLineString" else part
 
     def _check_materials(self) -> None:
         """Let the soil models refuse what only they know, each at a stress that any soil bears."""
@@ -805,15 +966,18 @@ class Scene(Model):
                 raise InvalidInput(path, error.value, error.allowed, error.hint) from None
 
     def _check_stages(self) -> None:
-        if not isinstance(self.stages[0], Gravity):
+        first = 1 if isinstance(self.stages[0], Seepage) else 0
+        if len(self.stages) > first and not isinstance(self.stages[first], Gravity):
             raise InvalidInput(
-                "scene.stages[0].kind",
-                self.stages[0].kind,
+                f"scene.stages[{first}].kind",
+                self.stages[first].kind,
                 "must be 'gravity': shaking needs the stresses at rest",
             )
-        for i, stage in enumerate(self.stages[1:], start=1):
+        for i, stage in enumerate(self.stages[first + 1 :], start=first + 1):
             if isinstance(stage, Gravity):
-                raise InvalidInput(f"scene.stages[{i}].kind", "gravity", "must be the first stage only")
+                raise InvalidInput(
+                    f"scene.stages[{i}].kind", "gravity", "must come before all shaking, and only once"
+                )
 
     def _check_bases(self) -> None:
         shaken = [(i, stage) for i, stage in enumerate(self.stages) if isinstance(stage, Shaking)]
@@ -966,13 +1130,15 @@ class Scene(Model):
         x0, _, x1, _ = self.bounds
         return stage.base.arrivals(x0, x1)
 
-    def duration(self, stage: Gravity | Shaking) -> float | None:
+    def duration(self, stage: Gravity | Shaking | Seepage) -> float | None:
         """Duration of a stage in s: as given, or else until the last motion has passed, which is read.
 
-        None for gravity, which ends at rest.
+        None for gravity, which ends at rest, and for seepage to its steady state.
         """
-        if isinstance(stage, Gravity) or stage.duration is not None:
-            return stage.duration if isinstance(stage, Shaking) else None
+        if isinstance(stage, Gravity):
+            return None
+        if isinstance(stage, Seepage) or stage.duration is not None:
+            return stage.duration
         own = max(motion.load().duration if motion else 0.0 for motion in (stage.motion, stage.vertical))
         return max(
             arrival.latest + (arrival.motion.load().duration if arrival.motion else own)
@@ -986,15 +1152,36 @@ class Scene(Model):
         (x0, y0), (x1, y1) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
         return float(x0), float(y0), float(x1), float(y1)
 
+    def water_level_at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Elevation of the water table above each x, m; below everything in a dry scene."""
+        table = self.water_table
+        if table is None:
+            return np.full(np.shape(x), -np.inf)
+        if table.points is not None:
+            levels: NDArray[np.float64] = np.interp(x, *np.transpose(table.points))
+            return levels
+        level = self.bounds[3] - table.depth if table.depth is not None else table.elevation
+        return np.full(np.shape(x), level)
+
     @property
-    def water_level(self) -> float | None:
-        """Elevation of the water table, m; None in a dry scene."""
-        if self.water_table is None:
-            return None
-        if self.water_table.elevation is not None:
-            return self.water_table.elevation
-        assert self.water_table.depth is not None
-        return self.bounds[3] - self.water_table.depth
+    def seepage(self) -> Seepage | None:
+        """The seepage stage, if there is one."""
+        first = self.stages[0]
+        return first if isinstance(first, Seepage) else None
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether water is all that moves: no stage looks at the grains."""
+        return len(self.stages) == 1 and self.seepage is not None
+
+    @property
+    def is_partly_saturated(self) -> bool:
+        """Whether some pores hold air at the start, or may come to."""
+        if self.water is None:
+            return False
+        return bool(self._regions_above_water()) or (
+            self.seepage is not None and any(region.retention for region in self.regions)
+        )
 
     @property
     def stage_names(self) -> list[str]:
@@ -1006,7 +1193,7 @@ class Scene(Model):
     @property
     def uses_acceleration_term(self) -> bool:
         """Whether the pore water's acceleration enters the flow (numerics.acceleration_term resolved)."""
-        conductivities = [region.hydraulic_conductivity or 0.0 for region in self.regions]
+        conductivities = [region.conductivity[0] for region in self.regions]
         if self.water is None or max(conductivities) == 0.0 or self.numerics.acceleration_term == "off":
             return False
         return (
@@ -1040,10 +1227,24 @@ class Scene(Model):
         if term != "auto":
             chosen = f"numerics.acceleration_term is {term!r}"
         return [
-            active("pore water", f"water table at elevation {self.water_level or 0.0:g} m", (not wet, dry)),
+            active("pore water", self._water_told(), (not wet, dry)),
+            active(
+                "seepage",
+                "to its steady state"
+                if self.seepage and self.seepage.duration is None
+                else "for its duration",
+                (not wet, dry),
+                (self.seepage is None, "no seepage stage"),
+            ),
             active("water diffusion", f"conductivity in {', '.join(permeable)}", *no_flow),
             active("water acceleration", chosen, *no_flow, (not self.uses_acceleration_term, chosen)),
-            ("partial saturation", False, "the water table is nowhere below the ground" if wet else dry),
+            active(
+                "partial saturation",
+                ", ".join(region.name for region in self.regions if region.retention)
+                or "dry above the water",
+                (not wet, dry),
+                (not self.is_partly_saturated, "the water table is nowhere below the ground"),
+            ),
             active(
                 "soil state",
                 f"in {', '.join(stateful)}",
@@ -1096,6 +1297,12 @@ class Scene(Model):
                 else f"numerics.velocity_filter is {self.numerics.filter_strength:g}",
             ),
         ]
+
+    def _water_told(self) -> str:
+        x0, _, x1, _ = self.bounds
+        low, high = sorted(self.water_level_at(np.array([x0, x1])))
+        told = f"{low:g} m" if low == high else f"{low:g} to {high:g} m"
+        return f"water table at elevation {told}"
 
     def _columns_told(self) -> str:
         """Which sides have a column, and how many particles all columns together."""
@@ -1210,6 +1417,6 @@ def _passage(base: CompliantBase) -> str:
     return f"{len(base.segments)} segments" if len(base.segments) > 1 else ""
 
 
-def _anchored(stage: Gravity | Shaking, folder: Path) -> Gravity | Shaking:
+def _anchored(stage: Gravity | Shaking | Seepage, folder: Path) -> Gravity | Shaking | Seepage:
     """The stage with its motions' files found from `folder`."""
     return stage.with_motions(lambda spec: spec.anchored(folder)) if isinstance(stage, Shaking) else stage

@@ -19,6 +19,7 @@ from .columns import INTERVAL as COLUMN_INTERVAL
 from .columns import key as column_key
 from .columns import load as load_columns
 from .discretise import Discretisation, Floats, discretise
+from .hydraulics import Drain, Seepage, series_of
 from .motion import Motion
 from .scene import Gravity, Region, Scene, Shaking
 
@@ -51,7 +52,9 @@ FIELDS: dict[str, Quantity] = {
     "velocity": Quantity("m/s", "(x, y)"),
     "acceleration": Quantity("m/s2", "(x, y)"),
     "excess_pore_pressure": Quantity("kPa", "since shaking began, compression positive"),
-    "pore_pressure": Quantity("kPa", "hydrostatic and excess, compression positive"),
+    "pore_pressure": Quantity("kPa", "at rest and excess, compression positive, suction negative"),
+    "head": Quantity("m", "total head, pressure head and elevation"),
+    "saturation": Quantity("1", "water per volume of pores"),
     "r_u": Quantity("1", "excess pore pressure over the geostatic vertical effective stress"),
     "r_u_stress": Quantity("1", "one minus vertical effective stress over its geostatic value"),
     "sigma_v_eff": Quantity("kPa", "vertical effective stress, compression positive"),
@@ -66,6 +69,12 @@ FIELDS: dict[str, Quantity] = {
 
 # Fields that exist only with water.
 WATER_FIELDS = ("excess_pore_pressure", "pore_pressure", "r_u")
+
+# Fields of water that flows through ground at rest.
+SEEPAGE_FIELDS = ("pore_pressure", "head", "saturation")
+
+# Fields with two components.
+VECTOR_FIELDS = ("displacement", "velocity", "acceleration")
 
 # Fields of which the largest value over all steps can be kept.
 ENVELOPES = ("r_u", "gamma_max")
@@ -178,15 +187,23 @@ class Simulation:
         self.doubts = doubts(scene, loaded)
         for doubt in self.doubts:
             warnings.warn(doubt, SandboilWarning, stacklevel=2)
-        section = _description(scene, self.particles)
+        if scene.seepage is not None and (columns is not None or keep_columns):
+            name, value = ("columns", columns) if columns is not None else ("keep_columns", keep_columns)
+            raise InvalidInput(name, value, "does not go with a seepage stage: columns follow from its water")
+        self._threads = threads
         self._stages = [
             _shaking_description(scene, stage, duration, waves, self.probes)
             if isinstance(stage, Shaking) and duration is not None and waves is not None
             else None
             for stage, duration, waves in zip(scene.stages, self._durations, self._waves, strict=True)
         ]
-        self._columns = self._use_columns(section, columns, keep_columns)
-        self._core = _core.Simulation(section, threads)
+        self._water: _core.Seepage | None = None
+        self._grains: _core.Simulation | None = None
+        self._columns: list[tuple[str, str, str]] = []
+        if scene.seepage is None:
+            section = _description(scene, self.particles)
+            self._columns = self._use_columns(section, columns, keep_columns)
+            self._grains = _core.Simulation(section, threads)
         self._index = -1
         self._begin_next_stage()
 
@@ -198,29 +215,40 @@ class Simulation:
         return self.scene.stage_names[self._index]
 
     @property
+    def present_stage(self) -> Gravity | Shaking | Seepage:
+        """The present stage."""
+        return self.scene.stages[self._index]
+
+    @property
     def time(self) -> float:
         """Time since the present stage began, s. In the gravity stage it only counts the way to rest."""
-        return self._core.time
+        return self._present.time
 
     @property
     def dt(self) -> float:
         """Present time step, s."""
-        return self._core.time_step[0]
+        return (
+            self._present.time_step
+            if isinstance(self._present, _core.Seepage)
+            else self._present.time_step[0]
+        )
 
     @property
     def dt_limit(self) -> str:
         """What limits the time step."""
-        return self._core.time_step[1]
+        if isinstance(self._present, _core.Seepage):
+            return "change of saturation"
+        return self._present.time_step[1]
 
     @property
     def undamped_dt(self) -> float | None:
         """Time step that the stage would have without its Rayleigh damping, s; None if it has none."""
-        return self._core.undamped_time_step
+        return None if self._grains is None else self._grains.undamped_time_step
 
     @property
     def steps(self) -> int:
         """Steps made in the present stage."""
-        return self._core.step
+        return self._present.step
 
     @property
     def duration(self) -> float | None:
@@ -230,7 +258,7 @@ class Simulation:
     @property
     def stage_is_complete(self) -> bool:
         """Whether the present stage has reached its end."""
-        return self._core.is_complete
+        return self._present.is_complete
 
     @property
     def is_complete(self) -> bool:
@@ -241,9 +269,9 @@ class Simulation:
         """Make `count` steps, going on to the next stage where one ends; returns how many were made."""
         made = 0
         while made < count and self._under_way():
-            before = self._core.step
-            self._core.advance(steps=count - made, until=math.inf, seconds=LOOK_INTERVAL)
-            made += self._core.step - before
+            before = self._present.step
+            self._present.advance(steps=count - made, until=math.inf, seconds=LOOK_INTERVAL)
+            made += self._present.step - before
         return made
 
     def run_stage(self) -> None:
@@ -258,8 +286,8 @@ class Simulation:
         Returns whether `until` or the end of the stage is reached, to half a time step: the time step is
         never changed to meet it.
         """
-        done = self._core.advance(steps=_NO_LIMIT, until=until, seconds=seconds)
-        return done or self._core.time + 0.5 * self.dt >= until
+        done = self._present.advance(steps=_NO_LIMIT, until=until, seconds=seconds)
+        return done or self._present.time + 0.5 * self.dt >= until
 
     def begin_next_stage(self) -> None:
         """Leave the present stage as it stands and begin the next one."""
@@ -276,12 +304,38 @@ class Simulation:
     def _begin_next_stage(self) -> None:
         self._index += 1
         stage = self.scene.stages[self._index]
+        if isinstance(stage, Seepage):
+            section = _description(self.scene, self.particles)
+            conditions = [_condition(self.scene, condition) for condition in stage.conditions]
+            pressure = self.particles.pore_pressure0
+            self._water = _core.Seepage(section, pressure, conditions, stage.duration)
+            return
+        if self._grains is None:
+            assert self._water is not None
+            self.particles = self.particles.with_pore_water(
+                self._water.pore_pressure(), self._water.saturation()
+            )
+            self._grains = _core.Simulation(_description(self.scene, self.particles), self._threads)
         if isinstance(stage, Gravity):
-            self._core.begin_gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
+            self._grains.begin_gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
             return
         shaking = self._stages[self._index]
         assert shaking is not None
-        self._core.begin_shaking(shaking)
+        self._grains.begin_shaking(shaking)
+
+    @property
+    def _present(self) -> _core.Simulation | _core.Seepage:
+        """What computes the present stage."""
+        present = self._water if self._grains is None else self._grains
+        assert present is not None
+        return present
+
+    @property
+    def _moving(self) -> _core.Simulation:
+        """The grains, in stages in which they may move."""
+        if self._grains is None:
+            raise SandboilError(f"{self.stage!r} does not look at the grains")
+        return self._grains
 
     def _use_columns(
         self, section: dict[str, Any], read: str | os.PathLike[str] | None, keep: bool
@@ -312,7 +366,9 @@ class Simulation:
 
     def take_columns(self) -> list[tuple[str, str, str, ColumnRecord]]:
         """Stage, side, fingerprint and record of the present stage's columns, if they are kept; once."""
-        records = dict(zip(HANDS, self._core.take_column_records(), strict=True))
+        if self._grains is None:
+            return []
+        records = dict(zip(HANDS, self._grains.take_column_records(), strict=True))
         return [
             (stage, hand, fingerprint, ColumnRecord.of_core(told))
             for stage, hand, fingerprint in self._columns
@@ -324,7 +380,7 @@ class Simulation:
     @property
     def field_names(self) -> list[str]:
         """Names that :meth:`field` knows in this scene."""
-        return [name for name in FIELDS if self.scene.water is not None or name not in WATER_FIELDS]
+        return list(SEEPAGE_FIELDS) if self._grains is None else _moving_fields(self.scene)
 
     def field(self, name: str) -> Floats:
         """A field at the nodes: (n, 2) for displacement, velocity and acceleration, else (n,).
@@ -339,7 +395,16 @@ class Simulation:
 
     def fields(self, names: list[str]) -> dict[str, Floats]:
         """Several fields of the same instant; see :meth:`field`."""
-        core, particles = self._core, self.particles
+        if self._grains is None:
+            water = self._water
+            assert water is not None
+            of_water = {
+                "pore_pressure": water.pore_pressure,
+                "head": water.head,
+                "saturation": water.saturation,
+            }
+            return {name: of_water[name]() for name in names}
+        core, particles = self._grains, self.particles
         excess = core.excess_pore_pressure()
         stress, strain = core.stress(), core.strain()
         # The out-of-plane stress is left out: PM4Sand does not use it, and nothing keeps it physical.
@@ -360,6 +425,8 @@ class Simulation:
             values["excess_pore_pressure"] = excess
             values["pore_pressure"] = particles.pore_pressure0 + excess
             values["r_u"] = pore_pressure_ratio(excess, particles.sigma_v_eff0)
+        full = particles.saturation0
+        values["saturation"] = np.ones(len(sigma_v)) if full is None else full
         return {name: np.ascontiguousarray(values[name]) for name in names}
 
     def envelope(self, name: str) -> Floats | None:
@@ -369,10 +436,12 @@ class Simulation:
         """
         if name not in ENVELOPES:
             raise unknown_name("envelope", name, list(ENVELOPES))
+        if self._grains is None:
+            return None
         if name == "gamma_max":
-            largest = self._core.largest_shear_strain()
+            largest = self._grains.largest_shear_strain()
         else:
-            excess = self._core.largest_excess_pore_pressure()
+            excess = self._grains.largest_excess_pore_pressure()
             largest = None if excess is None else pore_pressure_ratio(excess, self.particles.sigma_v_eff0)
         # The core looks at the beginning of every step: the present state is not among them yet.
         return None if largest is None else np.maximum(largest, self.field(name))
@@ -382,52 +451,98 @@ class Simulation:
 
         They have gone through a low-pass filter before thinning. Empty outside a shaking stage.
         """
-        time, values = self._core.take_histories()
+        if self._grains is None:
+            return np.empty(0), {}
+        time, values = self._grains.take_histories()
         histories = {}
-        for k, channel in enumerate(self._core.channel_names()):
+        for k, channel in enumerate(self._grains.channel_names()):
             name, factor = _CHANNELS.get(channel, (channel, 1.0))
             histories[name] = factor * values[:, :, k] if len(time) else np.empty((0, len(self.probes)))
         return time, histories
 
     def finish_histories(self) -> None:
         """Close the samples still collecting: the run ends here, before its stage does."""
-        self._core.finish_histories()
+        if self._grains is not None:
+            self._grains.finish_histories()
 
     # Accounting
 
     @property
     def residual(self) -> float:
         """Largest unbalanced acceleration over gravity in the gravity stage; infinite before a step."""
-        return self._core.residual
+        return self._moving.residual
 
     @property
     def base_impedance(self) -> float | None:
         """Mean dashpot coefficient rho Cs of the base, kPa s/m; None without a compliant base."""
-        impedance = self._core.base_impedance
+        impedance = None if self._grains is None else self._grains.base_impedance
         return float(np.mean(impedance)) if impedance else None
 
     @property
     def flow_scheme(self) -> str:
         """How pore pressure is advanced in the stage: "none", "undrained", "explicit", "implicit", ..."""
-        return self._core.flow_scheme
+        return "seepage" if self._grains is None else self._grains.flow_scheme
 
     @property
     def stress_nodes(self) -> int:
         """Number of stress nodes."""
-        return int(np.prod(self._core.stress().shape[:2]))
+        return 0 if self._grains is None else int(np.prod(self._grains.stress().shape[:2]))
 
     @property
     def pairs(self) -> int:
         """Pairs of stress and velocity nodes."""
-        return self._core.pairs
+        return 0 if self._grains is None else self._grains.pairs
+
+    @property
+    def discharge(self) -> list[tuple[str, float]]:
+        """Kind of each seepage condition and inflow through it, m3/s per m; empty without a seepage stage."""
+        seepage = self.scene.seepage
+        if self._water is None or seepage is None:
+            return []
+        kinds = [condition.kind for condition in seepage.conditions]
+        return list(zip(kinds, self._water.discharge().tolist(), strict=True))
+
+    @property
+    def water_balance(self) -> tuple[list[float], float] | None:
+        """Inflow through each condition since the start, and increase of the stored water, m3 per m.
+
+        None without a seepage stage of some duration: a steady state stores nothing.
+        """
+        seepage = self.scene.seepage
+        if self._water is None or seepage is None or seepage.duration is None:
+            return None
+        inflow, stored = self._water.balance()
+        return inflow.tolist(), stored
+
+    def outlets(self, condition: int) -> Floats:
+        """Where water passes a condition of the seepage stage: rows of x, y (m) and inflow (m3/s per m)."""
+        if self._water is None:
+            raise SandboilError("the scene has no seepage stage")
+        return self._water.outlets(condition)
 
     def arrays(self) -> dict[str, int]:
         """Bytes of the core's arrays by name; what the scene does not ask for is not there."""
-        return dict(self._core.arrays())
+        return dict(self._present.arrays())
 
     def counters(self) -> dict[str, int]:
         """Work done since the scene was made, by kind."""
-        return self._core.counters()
+        seepage = {} if self._water is None else self._water.counters()
+        grains = {} if self._grains is None else self._grains.counters()
+        return {f"seepage_{name}": count for name, count in seepage.items()} | grains
+
+
+def written_fields(scene: Scene) -> list[str]:
+    """Names of the fields that a run of a scene writes: of the water alone if nothing else may move."""
+    return list(SEEPAGE_FIELDS) if scene.is_at_rest else _moving_fields(scene)
+
+
+def _moving_fields(scene: Scene) -> list[str]:
+    absent = {"head"}
+    if scene.water is None:
+        absent |= set(WATER_FIELDS)
+    if not scene.is_partly_saturated:
+        absent.add("saturation")
+    return [name for name in FIELDS if name not in absent]
 
 
 def pore_pressure_ratio(pressure: Floats, sigma_v_eff0: Floats) -> Floats:
@@ -571,6 +686,7 @@ def _description(scene: Scene, particles: Discretisation) -> dict[str, Any]:
         "surface_elevation": particles.surface_elevation,
         "vertical_effective_stress": sigma_v_eff,
         "pore_pressure": np.empty(0) if water is None else particles.pore_pressure0,
+        "saturation": np.empty(0) if particles.saturation0 is None else particles.saturation0,
         "water": None if water is None else (water.unit_weight, water.bulk_modulus),
         "gravity": scene.gravity,
         "period": x1 - x0 if isinstance(scene.sides, Periodic) else None,
@@ -637,8 +753,17 @@ def _shaking_description(
     }
 
 
+def _condition(scene: Scene, condition: Any) -> dict[str, Any]:
+    """A hydraulic condition as the numerical core takes it."""
+    line = np.array(scene.condition_line(condition).coords)
+    series = () if isinstance(condition, Drain) else series_of(condition)
+    time, value = zip(*series, strict=True) if series else ((), ())
+    return {"kind": condition.kind, "line": line, "series": (list(time), list(value))}
+
+
 def _gravity(scene: Scene) -> Gravity:
-    return next(stage for stage in scene.stages if isinstance(stage, Gravity))
+    """The static stage, or what it would be in a scene that has none."""
+    return next((stage for stage in scene.stages if isinstance(stage, Gravity)), Gravity())
 
 
 def _region(scene: Scene, region: Region) -> dict[str, Any]:
@@ -648,7 +773,8 @@ def _region(scene: Scene, region: Region) -> dict[str, Any]:
         "material": region.material.core(),
         "porosity": soil.porosity,
         "solid_density": soil.solid_density,
-        "hydraulic_conductivity": region.hydraulic_conductivity or 0.0,
+        "hydraulic_conductivity": region.conductivity,
+        "retention": None if region.retention is None else region.retention.core,
         "earth_pressure_coefficient": region.K0,
         "static_poisson_ratio": region.initial_poisson_ratio if poisson is None else poisson,
     }

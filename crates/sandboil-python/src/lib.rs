@@ -3,6 +3,7 @@
 mod errors;
 mod laboratory;
 mod material;
+mod seepage;
 mod shear_cell;
 mod simulation;
 
@@ -14,7 +15,9 @@ mod _core {
     #[pymodule_export]
     use crate::laboratory::{Specimen, carries, pm4sand_constants};
     #[pymodule_export]
-    use crate::material::small_strain_moduli;
+    use crate::material::{saturation, small_strain_moduli};
+    #[pymodule_export]
+    use crate::seepage::Seepage;
     #[pymodule_export]
     use crate::shear_cell::ShearCell;
     #[pymodule_export]

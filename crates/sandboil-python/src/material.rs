@@ -3,7 +3,7 @@
 use crate::errors::CoreError;
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
 use sandboil_soil::{
-    Integrator, Soil, SoilError, Strength, Stress,
+    Integrator, Soil, SoilError, Strength, Stress, VanGenuchten,
     drucker_prager::{self, DruckerPrager, Matching},
     elastic::Elastic,
     mohr_coulomb::MohrCoulomb,
@@ -151,6 +151,23 @@ pub fn small_strain_moduli(material: &Bound<'_, PyDict>, stress: [f64; 4]) -> Py
     let moduli = soil(material, false)?.small_strain_moduli(Stress { xx, yy, xy, zz });
     let moduli = moduli.map_err(|error| refused(&error))?;
     Ok((moduli.shear, moduli.bulk))
+}
+
+/// Degree of saturation at pressure heads (m) by a retention curve `(alpha, n, residual, full)`.
+#[pyfunction]
+pub fn saturation<'py>(
+    py: Python<'py>,
+    curve: (f64, f64, f64, f64),
+    pressure_head: numpy::PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, numpy::PyArray1<f64>>> {
+    let curve = retention(curve)?;
+    let heads = pressure_head.as_array();
+    Ok(numpy::PyArray1::from_iter(py, heads.iter().map(|&head| curve.at(head).saturation)))
+}
+
+/// A retention curve by `(alpha, n, residual, full)`.
+pub fn retention((alpha, n, residual, full): (f64, f64, f64, f64)) -> PyResult<VanGenuchten> {
+    VanGenuchten::new(alpha, n, residual, full).map_err(|error| refused(&error))
 }
 
 /// An integrator by its name, with what the user changed of it.

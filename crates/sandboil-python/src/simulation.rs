@@ -2,7 +2,7 @@
 
 use crate::{
     errors::CoreError,
-    material::{integrator, soil},
+    material::{integrator, retention, soil},
 };
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, ToPyArray, ndarray::Array};
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
@@ -31,7 +31,7 @@ fn one_of<T: Copy>(key: &str, value: &str, choices: &[(&str, T)]) -> PyResult<T>
     })
 }
 
-fn vectors(rows: &PyReadonlyArray2<'_, f64>) -> Vec<solver::Vec2> {
+pub fn vectors(rows: &PyReadonlyArray2<'_, f64>) -> Vec<solver::Vec2> {
     rows.as_array().outer_iter().map(|row| solver::Vec2::new(row[0], row[1])).collect()
 }
 
@@ -69,12 +69,19 @@ pub fn numerics(dict: &Bound<'_, PyDict>) -> PyResult<solver::Numerics> {
     })
 }
 
+/// Largest and smallest conductivity, m/s, and the direction of the largest.
+fn conductivity(dict: &Bound<'_, PyDict>) -> PyResult<solver::Conductivity> {
+    let (major, minor, (x, y)): (f64, f64, (f64, f64)) = get(dict, "hydraulic_conductivity")?;
+    Ok(solver::Conductivity { major, minor, direction: solver::Vec2::new(x, y) })
+}
+
 fn region(dict: &Bound<'_, PyDict>, gap_memory: bool) -> PyResult<solver::Region> {
     Ok(solver::Region {
         soil: soil(&get::<Bound<'_, PyDict>>(dict, "material")?, gap_memory)?,
         porosity: get(dict, "porosity")?,
         solid_density: get(dict, "solid_density")?,
-        hydraulic_conductivity: get(dict, "hydraulic_conductivity")?,
+        hydraulic_conductivity: conductivity(dict)?,
+        retention: get::<Option<(f64, f64, f64, f64)>>(dict, "retention")?.map(retention).transpose()?,
         earth_pressure_coefficient: get(dict, "earth_pressure_coefficient")?,
         static_poisson_ratio: get(dict, "static_poisson_ratio")?,
     })
@@ -147,7 +154,7 @@ fn base(stage: &Bound<'_, PyDict>) -> PyResult<solver::Base> {
     })
 }
 
-fn model(dict: &Bound<'_, PyDict>) -> PyResult<solver::Model> {
+pub fn model(dict: &Bound<'_, PyDict>) -> PyResult<solver::Model> {
     let numerics_dict: Bound<'_, PyDict> = get(dict, "numerics")?;
     let gap_memory = get(&numerics_dict, "gap_memory")?;
     let regions: Vec<Bound<'_, PyDict>> = get(dict, "regions")?;
@@ -163,6 +170,7 @@ fn model(dict: &Bound<'_, PyDict>) -> PyResult<solver::Model> {
         surface_elevation: floats("surface_elevation")?,
         vertical_effective_stress: floats("vertical_effective_stress")?,
         pore_pressure: floats("pore_pressure")?,
+        saturation: floats("saturation")?,
         water: water.map(|(unit_weight, bulk_modulus)| solver::Water { unit_weight, bulk_modulus }),
         gravity: get(dict, "gravity")?,
         period: get::<Option<f64>>(dict, "period")?.map(|width| solver::Period { width }),

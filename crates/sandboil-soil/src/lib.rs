@@ -13,6 +13,7 @@ pub mod mohr_coulomb;
 pub mod pm4sand;
 pub mod pressure_elastic;
 mod report;
+pub mod retention;
 mod strength;
 mod tensor;
 pub mod total_stress;
@@ -21,6 +22,7 @@ pub use error::SoilError;
 pub use integrator::Integrator;
 pub use model::{Soil, SoilModel};
 pub use report::UpdateReport;
+pub use retention::{Moisture, VanGenuchten};
 pub use strength::Strength;
 pub use tensor::{Deviator, StrainIncrement, Stress};
 

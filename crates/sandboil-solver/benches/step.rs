@@ -16,7 +16,7 @@ use sandboil_soil::{
     Soil,
     pm4sand::{Options, PM4Sand, Parameters},
 };
-use sandboil_solver::{Gravity, Model, Shaking, Side, Simulation, Support, UpgoingWave, Water};
+use sandboil_solver::{Conductivity, Gravity, Model, Shaking, Side, Simulation, Support, UpgoingWave, Water};
 use std::time::Instant;
 
 const WATER: Water = Water { unit_weight: 10.0, bulk_modulus: 1e6 };
@@ -43,7 +43,7 @@ fn model(ground: Ground, columns: usize) -> Model {
     if matches!(ground, Ground::Sand) {
         let parameters = Parameters { dr: 0.55, g0: 677.0, hpo: 0.4, ..Parameters::default() };
         region.soil = Soil::PM4Sand(Box::new(PM4Sand::new(parameters, Options::default()).unwrap()));
-        region.hydraulic_conductivity = 1e-3;
+        region.hydraulic_conductivity = Conductivity::isotropic(1e-3);
     }
     column(height, SPACING, columns, region, water)
 }

@@ -145,22 +145,7 @@ impl Outline {
 
     /// The nearest point of the base, and the outward normal there.
     fn nearest_on_base(&self, at: Vec2) -> Option<(Vec2, Vec2)> {
-        let last = self.base.len().checked_sub(2)?;
-        let candidate = |(k, pair): (usize, &[Vec2])| {
-            let along = pair[1] - pair[0];
-            let place = (at - pair[0]).dot(&along) / along.norm_squared();
-            // The end segments are rays: the base has no end inside the section's width.
-            let low = if k == 0 { f64::NEG_INFINITY } else { 0.0 };
-            let high = if k == last { f64::INFINITY } else { 1.0 };
-            let foot = pair[0] + along * place.clamp(low, high);
-            let outward = if (low..=high).contains(&place) { normal(along) } else { (foot - at).normalize() };
-            (foot, outward)
-        };
-        self.base
-            .windows(2)
-            .enumerate()
-            .map(candidate)
-            .min_by(|(a, _), (b, _)| (a - at).norm_squared().total_cmp(&(b - at).norm_squared()))
+        nearest_on(&self.base, at)
     }
 
     /// The outline moved: base, left and right side each by its own displacement, m.
@@ -178,6 +163,26 @@ impl Outline {
         }
         moved
     }
+}
+
+/// The nearest point of a line that runs from left to right and goes on beyond its ends, and the normal there on its
+/// right-hand side.
+pub(crate) fn nearest_on(line: &[Vec2], at: Vec2) -> Option<(Vec2, Vec2)> {
+    let last = line.len().checked_sub(2)?;
+    let candidate = |(k, pair): (usize, &[Vec2])| {
+        let along = pair[1] - pair[0];
+        let place = (at - pair[0]).dot(&along) / along.norm_squared();
+        // The end segments are rays: the line has no end inside the section's width.
+        let low = if k == 0 { f64::NEG_INFINITY } else { 0.0 };
+        let high = if k == last { f64::INFINITY } else { 1.0 };
+        let foot = pair[0] + along * place.clamp(low, high);
+        let outward = if (low..=high).contains(&place) { normal(along) } else { (foot - at).normalize() };
+        (foot, outward)
+    };
+    line.windows(2)
+        .enumerate()
+        .map(candidate)
+        .min_by(|(a, _), (b, _)| (a - at).norm_squared().total_cmp(&(b - at).norm_squared()))
 }
 
 /// Outward normal of a stretch of base.
@@ -248,6 +253,10 @@ pub struct Image {
 }
 
 impl Image {
+    /// Shows its node as it is.
+    pub(crate) const WHOLE: Self =
+        Self { map: Mat2::new(1.0, 0.0, 0.0, 1.0), strain: [true; 2], flow: [true; 2], below: false };
+
     fn new(condition: Condition, normal: Vec2, below: bool) -> Self {
         let mirror = Mat2::identity() - normal * normal.transpose() * 2.0;
         let (map, strain, flow) = match condition {
@@ -275,6 +284,15 @@ impl Image {
     }
 }
 
+/// Where an image is seen across an edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// Point of the edge, m.
+    pub foot: Vec2,
+    /// Normal of the edge there.
+    pub normal: Vec2,
+}
+
 /// Real nodes followed by their images.
 #[derive(Debug, Clone)]
 pub struct Surroundings {
@@ -282,13 +300,19 @@ pub struct Surroundings {
     pub sources: Vec<Source>,
     /// What the images show, in the order of their sources.
     pub images: Vec<Image>,
+    /// The edge that an image is seen across, two beyond a corner; in the order of the images.
+    pub crossings: Vec<[Option<Crossing>; 2]>,
 }
 
 impl Surroundings {
     /// Nodes alone.
     pub fn bare(position: &[Vec2]) -> Self {
         let real = |(i, &position): (usize, &Vec2)| Source { owner: id(i), position, mirrored: false };
-        Self { sources: position.iter().enumerate().map(real).collect(), images: Vec::new() }
+        Self {
+            sources: position.iter().enumerate().map(real).collect(),
+            images: Vec::new(),
+            crossings: Vec::new(),
+        }
     }
 
     /// Nodes and all images of those within `reach` of an edge, m.
@@ -301,8 +325,9 @@ impl Surroundings {
                 && (foot - at).dot(&outward) < reach
             {
                 let image = Image::new(walls.base, outward, true);
-                below[i] = Some((2.0 * foot - at, image));
-                all.add(i, 2.0 * foot - at, image);
+                let crossing = Crossing { foot, normal: outward };
+                below[i] = Some((2.0 * foot - at, image, crossing));
+                all.add(id(i), 2.0 * foot - at, image, [Some(crossing), None]);
             }
         }
         for ((hand, side), condition) in Hand::BOTH.into_iter().zip(outline.sides).zip(walls.sides) {
@@ -314,9 +339,11 @@ impl Surroundings {
                 if (Vec2::new(side.x, at.y) - at).dot(&hand.normal()) < reach
                     && (bottom..=top).contains(&at.y)
                 {
-                    all.add(i, across(at), mirror);
-                    if let Some((place, image)) = below[i] {
-                        all.add(i, across(place), image.seen_in(mirror));
+                    let crossing = Crossing { foot: Vec2::new(side.x, at.y), normal: hand.normal() };
+                    all.add(id(i), across(at), mirror, [Some(crossing), None]);
+                    if let Some((place, image, base)) = below[i] {
+                        let crossings = [Some(base), Some(crossing)];
+                        all.add(id(i), across(place), image.seen_in(mirror), crossings);
                     }
                 }
             }
@@ -324,8 +351,9 @@ impl Surroundings {
         all
     }
 
-    fn add(&mut self, owner: usize, position: Vec2, image: Image) {
-        self.sources.push(Source { owner: id(owner), position, mirrored: true });
+    pub(crate) fn add(&mut self, owner: u32, position: Vec2, image: Image, crossings: [Option<Crossing>; 2]) {
+        self.crossings.push(crossings);
+        self.sources.push(Source { owner, position, mirrored: true });
         self.images.push(image);
     }
 

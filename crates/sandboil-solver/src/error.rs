@@ -64,6 +64,14 @@ pub enum SolverError {
         /// Tolerance asked.
         tolerance: f64,
     },
+    /// The flow of water has no solution that could be found.
+    #[error("seepage at time {time:.6} s: {reason}")]
+    Seepage {
+        /// Time in the stage, s.
+        time: f64,
+        /// What failed.
+        reason: &'static str,
+    },
     /// A soil model refused its input or failed.
     #[error("soil model of region {region}, node {node}: {source}")]
     Soil {

@@ -5,14 +5,15 @@
 
 use crate::{
     banded::BandedLu,
+    boundary::id,
     deformation::{Cofactor, Deformation},
     geometry::FlowTables,
-    model::{Model, STRESS_NODES},
+    model::{Model, STRESS_NODES, Water},
     parallel::{Rows, chunks, for_each_chunk},
     phases::Phases,
     skeleton::StressPoint,
 };
-use sandboil_sph::{Csr, Vec2};
+use sandboil_sph::{Csr, Mat2, Vec2};
 
 /// A node whose pressure follows from the prescribed value on the free surface (half-cell rule): only where the
 /// soil lets water out.
@@ -33,10 +34,9 @@ pub struct Flow {
     cofactor: Vec<Cofactor>,
     /// `K_f / n`: pressure rise per unit of volume strain, kPa.
     stiffness: Vec<f64>,
-    /// Hydraulic conductivity, m/s.
-    conductivity: Vec<f64>,
+    /// Hydraulic conductivity over gravity, s: what a unit of acceleration drives.
+    mobility: Vec<Mat2>,
     unit_weight: f64,
-    gravity: f64,
     surface: Vec<SurfaceNode>,
     /// Share of each node's excess pressure in the force: none of a node tied to the surface, all of the others.
     push: Vec<f64>,
@@ -71,10 +71,15 @@ impl Flow {
     /// Zero excess pressure everywhere.
     pub fn new(model: &Model, phases: &Phases, scheme: FlowScheme) -> Option<Self> {
         let water = model.water?;
-        let conductivity: Vec<f64> =
-            model.region.iter().map(|&r| model.regions[r as usize].hydraulic_conductivity).collect();
-        let surface: Vec<SurfaceNode> =
-            surface_nodes(model).into_iter().filter(|tie| conductivity[tie.node as usize] > 0.0).collect();
+        let conductivity = |node: usize| model.regions[model.region[node] as usize].hydraulic_conductivity;
+        let drains = |tie: &SurfaceNode| conductivity(tie.node as usize).major > 0.0;
+        let surface: Vec<SurfaceNode> = surface_nodes(model, water).into_iter().filter(drains).collect();
+        // Only the acceleration term reads them.
+        let mobility = if scheme == FlowScheme::ExplicitWithAcceleration {
+            (0..model.nodes()).map(|node| conductivity(node).tensor() / model.gravity).collect()
+        } else {
+            Vec::new()
+        };
         let mut push = vec![1.0; model.nodes()];
         for tie in &surface {
             push[tie.node as usize] = 0.0;
@@ -82,10 +87,9 @@ impl Flow {
         Some(Self {
             excess: vec![0.0; model.nodes()],
             cofactor: vec![Deformation::default().cofactor(); model.nodes()],
-            stiffness: (0..model.nodes()).map(|node| model.water_stiffness(phases.porosity(node))).collect(),
-            conductivity,
+            stiffness: (0..model.nodes()).map(|node| stiffness(model, phases, node)).collect(),
+            mobility,
             unit_weight: water.unit_weight,
-            gravity: model.gravity,
             surface,
             push,
             scheme: match scheme {
@@ -101,7 +105,7 @@ impl Flow {
     /// Takes over the porosities and forgets factors made for another geometry.
     pub fn geometry_changed(&mut self, model: &Model, phases: &Phases) {
         for (node, stiffness) in self.stiffness.iter_mut().enumerate() {
-            *stiffness = model.water_stiffness(phases.porosity(node));
+            *stiffness = self::stiffness(model, phases, node);
         }
         self.cofactor.fill(Deformation::default().cofactor());
         if let Scheme::Implicit { factors } = &mut self.scheme {
@@ -125,7 +129,10 @@ impl Flow {
             Scheme::Implicit { factors: Some((_, lu)) } => lu.bytes(),
             _ => 0,
         };
-        5 * size_of_val(self.excess.as_slice()) + size_of_val(self.cofactor.as_slice()) + factors
+        4 * size_of_val(self.excess.as_slice())
+            + size_of_val(self.mobility.as_slice())
+            + size_of_val(self.cofactor.as_slice())
+            + factors
     }
 
     /// Nominal excess pressure `q J F^-T` of node `i`, kPa.
@@ -178,8 +185,7 @@ impl Flow {
         });
         match (&mut self.scheme, &tables.diffusion) {
             (Scheme::Explicit { acceleration_term }, Some(diffusion)) => {
-                let conductivity = &self.conductivity;
-                let acceleration_term = acceleration_term.then_some(self.unit_weight / self.gravity);
+                let mobility = acceleration_term.then_some((&self.mobility, self.unit_weight));
                 let scale = dt / self.unit_weight;
                 let mut other = vec![(); excess.len()];
                 let rows = Rows { a: &mut self.right_hand_side, b: &mut unit, c: &mut other };
@@ -188,16 +194,16 @@ impl Flow {
                         let node = first + k;
                         let mut rate: f64 =
                             diffusion.iter_row(node).map(|(j, weight)| weight * excess[j]).sum();
-                        if let Some(density) = acceleration_term {
+                        if let Some((mobility, unit_weight)) = mobility {
                             let carried: f64 = divergence
                                 .iter_row(node)
                                 .map(|(j, weight)| {
                                     // Beyond a free-field side the soil is the node's own.
-                                    let conductivity = conductivity.get(j).unwrap_or(&conductivity[node]);
-                                    weight.dot(&acceleration[j]) * conductivity
+                                    let mobility = mobility.get(j).unwrap_or(&mobility[node]);
+                                    weight.dot(&(mobility * acceleration[j]))
                                 })
                                 .sum();
-                            rate += carried * density;
+                            rate += carried * unit_weight;
                         }
                         *right_hand_side += scale * stiffness[node] * rate;
                     }
@@ -232,6 +238,11 @@ impl Flow {
     }
 }
 
+/// Pressure rise of a node per unit of volume strain, kPa. Above the water table air gives way.
+fn stiffness(model: &Model, phases: &Phases, node: usize) -> f64 {
+    if model.saturation(node) < 1.0 { 0.0 } else { model.water_stiffness(phases.porosity(node)) }
+}
+
 /// `I - dt/C div(k grad)` with the surface nodes' rows replaced by their tie.
 fn implicit_matrix(diffusion: &Csr<f64>, surface: &[SurfaceNode], stiffness: &[f64], scale: f64) -> Csr<f64> {
     let mut matrix = Csr::with_capacity(diffusion.rows(), diffusion.entries());
@@ -250,13 +261,28 @@ fn implicit_matrix(diffusion: &Csr<f64>, surface: &[SurfaceNode], stiffness: &[f
     matrix
 }
 
-/// Nodes within one spacing of the surface, each with the node below that it interpolates to.
-fn surface_nodes(model: &Model) -> Vec<SurfaceNode> {
-    let depth = |node: usize| model.surface_elevation[node] - model.position[node].y;
+/// Nodes within one spacing of the drained surface, each with the node below that it interpolates to. That surface is the
+/// ground, or the water table where it lies deeper; what is above it has no excess pressure.
+fn surface_nodes(model: &Model, water: Water) -> Vec<SurfaceNode> {
+    let is_partly_saturated = !model.saturation.is_empty();
+    let depth = |node: usize| {
+        let below_ground = model.surface_elevation[node] - model.position[node].y;
+        if !is_partly_saturated {
+            return below_ground;
+        }
+        if model.saturation(node) < 1.0 {
+            0.0
+        } else {
+            below_ground.min(model.pore_pressure[node] / water.unit_weight)
+        }
+    };
     let near: Vec<usize> = (0..model.nodes()).filter(|&node| depth(node) < model.spacing.y).collect();
     let below = |node: usize| Vec2::new(model.position[node].x, model.position[node].y - model.spacing.y);
     near.iter()
         .filter_map(|&node| {
+            if is_partly_saturated && depth(node) <= 0.0 {
+                return Some(SurfaceNode { node: id(node), inner: id(node), fraction: 0.0 });
+            }
             let wanted = below(node);
             let miss = |other: usize| {
                 let mut offset = model.position[other] - wanted;
@@ -268,11 +294,7 @@ fn surface_nodes(model: &Model) -> Vec<SurfaceNode> {
             let inner = (0..model.nodes())
                 .filter(|&other| depth(other) > depth(node))
                 .min_by(|&a, &b| miss(a).total_cmp(&miss(b)))?;
-            Some(SurfaceNode {
-                node: u32::try_from(node).unwrap_or(u32::MAX),
-                inner: u32::try_from(inner).unwrap_or(u32::MAX),
-                fraction: depth(node) / depth(inner),
-            })
+            Some(SurfaceNode { node: id(node), inner: id(inner), fraction: depth(node) / depth(inner) })
         })
         .collect()
 }
@@ -283,7 +305,7 @@ mod tests {
     use crate::{
         boundary::{Condition, Outline, Walls},
         geometry::Geometry,
-        model::Water,
+        model::Conductivity,
         skeleton::tests::square_block,
     };
     use sandboil_sph::Period;
@@ -299,10 +321,10 @@ mod tests {
         model.outline = Outline::level(-0.5);
         model.surface_elevation = vec![SIDE as f64 - 0.5; model.nodes()];
         model.water = Some(Water { unit_weight: 1.0, bulk_modulus: 1.0 });
-        model.pore_pressure = vec![0.0; model.nodes()];
+        model.pore_pressure = model.position.iter().map(|x| SIDE as f64 - 0.5 - x.y).collect();
         model.regions.push(model.regions[0].clone());
         for (region, conductivity) in model.regions.iter_mut().zip([1.0, 1.0 / CONTRAST]) {
-            region.hydraulic_conductivity = conductivity;
+            region.hydraulic_conductivity = Conductivity::isotropic(conductivity);
         }
         model.region = (0..model.nodes()).map(|node| u32::from(node >= model.nodes() / 2)).collect();
         let volume = vec![1.0; model.nodes()];
@@ -311,7 +333,7 @@ mod tests {
         let diffusion = geometry.flow.unwrap().diffusion.unwrap();
         // Storage so small that a step of one second is steady.
         let stiffness = vec![1e12; model.nodes()];
-        let surface = surface_nodes(&model);
+        let surface = surface_nodes(&model, model.water.unwrap());
         let mut head = vec![0.0; model.nodes()];
         head[..SIDE].fill(1e12);
         BandedLu::factor(&implicit_matrix(&diffusion, &surface, &stiffness, 1.0)).unwrap().solve(&mut head);
@@ -346,7 +368,7 @@ mod tests {
         let mut model = square_block(9);
         model.surface_elevation = vec![1e3; model.nodes()];
         model.water = Some(Water { unit_weight: 10.0, bulk_modulus: 8.0 });
-        model.regions[0].hydraulic_conductivity = CONDUCTIVITY;
+        model.regions[0].hydraulic_conductivity = Conductivity::isotropic(CONDUCTIVITY);
         let volume = vec![1.0; model.nodes()];
         let walls = (&model.outline, Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]));
         let geometry = Geometry::build(&model, &model.position, &volume, walls, None);

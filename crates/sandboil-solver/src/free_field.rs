@@ -395,6 +395,7 @@ fn column_model(section: &Section, hand: Hand) -> Model {
             .flat_map(|&node| [0, 1].map(|k| model.vertical_effective_stress[STRESS_NODES * node + k]))
             .collect(),
         pore_pressure: pick(&model.pore_pressure),
+        saturation: pick(&model.saturation),
         period: Some(Period { width: model.spacing.x }),
         outline: Outline {
             base_support: outline.base_support,
@@ -415,6 +416,7 @@ fn same_column(a: &Model, b: &Model) -> bool {
         && close(&heights(a), &heights(b))
         && close(&a.vertical_effective_stress, &b.vertical_effective_stress)
         && close(&a.pore_pressure, &b.pore_pressure)
+        && close(&a.saturation, &b.saturation)
         && close(&a.surface_elevation, &b.surface_elevation)
         && close(&[a.outline.base_elevation(0.0)], &[b.outline.base_elevation(0.0)])
 }

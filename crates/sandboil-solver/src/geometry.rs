@@ -2,11 +2,12 @@
 
 use crate::{
     boundary::{Condition, Outline, Surroundings, Walls, id},
+    conduction::Conduction,
     model::{Model, Operators, STRESS_NODES, stress_node_offset},
 };
 use sandboil_sph::{
     Csr, GradientWeight, LeastSquaresFit, Mat2, NeighbourList, Period, Vec2, WendlandQuintic,
-    operators::{Member, consistent_fit, corrected_gradient, interpolation, laplacian_factor, stencil},
+    operators::{Member, consistent_fit, corrected_gradient, interpolation, stencil},
 };
 use std::{
     collections::BTreeMap,
@@ -86,12 +87,14 @@ pub struct Paired<T> {
 }
 
 impl<T: Copy + AddAssign> Paired<T> {
-    fn new(forward: Csr<T>, columns: usize) -> Self {
+    /// A table with so many columns, and its transpose.
+    pub fn new(forward: Csr<T>, columns: usize) -> Self {
         let transposed = forward.transposed(columns);
         Self { forward, transposed }
     }
 
-    fn bytes(&self) -> usize {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
         self.forward.bytes() + self.transposed.bytes()
     }
 }
@@ -102,7 +105,7 @@ pub struct FlowTables {
     /// `div v` at velocity nodes, component-wise weights with walls folded in (last term of Eq. 7). The
     /// transposed table is weighted with the row's volume: it is the pressure force.
     pub divergence: Paired<Vec2>,
-    /// `div (k grad H)` at velocity nodes, m/s per m of head (first two terms of Eq. 7); empty if undrained.
+    /// `div (k grad H)` at velocity nodes, 1/s per m of head (Eq. 3); none if undrained.
     pub diffusion: Option<Csr<f64>>,
 }
 
@@ -223,8 +226,10 @@ impl Geometry {
             Operators::Conservative => least_squares_tables(&stencils, &list.from_stress, &stress_position),
             Operators::Printed => printed_strain_tables(&stencils, &list.from_stress, &stress_position),
         };
-        let flow =
-            model.water.is_some().then(|| flow_tables(model, &stencils, &list.from_velocity, position));
+        let flow = model
+            .water
+            .is_some()
+            .then(|| flow_tables(model, &stencils, &list.from_velocity, &gradient, position));
         let printed = (model.numerics.operators == Operators::Printed)
             .then(|| printed_tables(&stencils, &list, position, &stress_position, (outline, walls)));
         let nodes = position.len();
@@ -373,37 +378,44 @@ pub fn divergence_row(stencils: &Stencils, members: &[Member], own: u32) -> Vec<
     row
 }
 
+/// Exchange of water in a section that does not deform.
+pub fn static_conduction(model: &Model) -> Conduction {
+    let kernel = WendlandQuintic::new(model.smoothing_length());
+    let (position, walls) = (&model.position, Walls::statics(&model.outline));
+    let around = Surroundings::new(position, &model.outline, walls, kernel.support());
+    let volume = vec![model.spacing.x * model.spacing.y; model.nodes()];
+    let stencils = Stencils { around: &around, volume: &volume, kernel, period: model.period };
+    let directed = model.regions.iter().any(|region| !region.hydraulic_conductivity.is_isotropic());
+    // Only anisotropic soil asks for gradients at stress nodes.
+    let points = if directed { stress_node_positions(position, model.spacing) } else { Vec::new() };
+    let list = NeighbourList::build(&points, &around.sources, kernel.support(), 0.0, model.period);
+    let (gradient, _, _) = least_squares_tables(&stencils, &list, &points);
+    Conduction::new(model, &stencils, &gradient, position)
+}
+
 /// Divergence and diffusion at velocity nodes (Eq. 7), images folded: velocity by what they show of it, head even.
-fn flow_tables(model: &Model, stencils: &Stencils, list: &NeighbourList, points: &[Vec2]) -> FlowTables {
+fn flow_tables(
+    model: &Model,
+    stencils: &Stencils,
+    list: &NeighbourList,
+    gradient: &Csr<GradientWeight>,
+    points: &[Vec2],
+) -> FlowTables {
     let mut divergence = Csr::with_capacity(points.len(), list.pairs());
-    let mut diffusion = Csr::with_capacity(points.len(), list.pairs());
-    let conductivity = |node: u32| model.regions[model.region[node as usize] as usize].hydraulic_conductivity;
-    let drains = model.regions.iter().any(|region| region.hydraulic_conductivity > 0.0);
     for (i, &at) in points.iter().enumerate() {
-        let own = id(i);
-        let members = stencils.all(list, i, at);
-        let mut head_row = Vec::new();
-        if let Ok(corrected) = corrected_gradient(&members, stencils.kernel)
-            && drains
-        {
-            let factor = laplacian_factor(&members, &corrected);
-            // sum V x_ji D F~ of Eq. 7: zero on a full lattice, it keeps linear heads exact elsewhere.
-            let first_moment: Vec2 = members.iter().zip(&factor).map(|(m, f)| m.offset * (2.0 * f)).sum();
-            for ((m, g), f) in members.iter().zip(&corrected).zip(&factor) {
-                // The harmonic mean carries the flux across a contact of two soils exactly.
-                let (k_i, k_j) = (conductivity(own), conductivity(m.owner));
-                let k_mean = if k_i + k_j > 0.0 { 2.0 * k_i * k_j / (k_i + k_j) } else { 0.0 };
-                let weight = 2.0 * k_mean * f - k_i * first_moment.dot(g);
-                head_row.push((m.owner, weight));
-                head_row.push((own, -weight));
-            }
-        }
-        divergence.push_row(&mut divergence_row(stencils, &members, own));
-        diffusion.push_row(&mut head_row);
+        divergence.push_row(&mut divergence_row(stencils, &stencils.all(list, i, at), id(i)));
     }
     let mut divergence = Paired::new(divergence, points.len());
     divergence.transposed.scale_by_column(stencils.volume);
-    FlowTables { divergence, diffusion: drains.then_some(diffusion) }
+    let drains = model.regions.iter().any(|region| region.hydraulic_conductivity.major > 0.0);
+    let diffusion = drains.then(|| {
+        let inverse: Vec<f64> = stencils.volume.iter().map(|volume| volume.recip()).collect();
+        let mut diffusion =
+            Conduction::new(model, stencils, gradient, points).saturated(|pair| pair.at_surface);
+        diffusion.scale_by_row(&inverse);
+        diffusion
+    });
+    FlowTables { divergence, diffusion }
 }
 
 /// Tables of Eqs 6, 9, 10 and 11 as printed.

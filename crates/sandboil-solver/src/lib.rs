@@ -6,19 +6,23 @@
 
 mod banded;
 pub mod base;
+mod bins;
 pub mod boundary;
 pub mod column;
+mod conduction;
 mod deformation;
 mod dispersion;
 pub mod error;
 mod flow;
 mod free_field;
 mod geometry;
+pub mod hydraulics;
 pub mod model;
 mod parallel;
 mod phases;
 mod rayleigh;
 mod record;
+pub mod seepage;
 pub mod shear_cell;
 pub mod simulation;
 mod skeleton;
@@ -31,9 +35,13 @@ pub use base::{Base, BaseSegment, HalfSpace, Impedance, UpgoingWave, Vertical};
 pub use boundary::{Outline, Side, Support};
 pub use column::ColumnRecord;
 pub use error::SolverError;
-pub use model::{AccelerationTerm, Diffusion, Model, Numerics, Operators, Region, Water, stress_node_offset};
+pub use hydraulics::{HydraulicBoundary, HydraulicCondition, Series};
+pub use model::{
+    AccelerationTerm, Conductivity, Diffusion, Model, Numerics, Operators, Region, Water, stress_node_offset,
+};
 pub use rayleigh::Rayleigh;
 pub use sandboil_sph::{Period, Vec2};
+pub use seepage::{Seepage, SeepageCounters, Until, WaterBalance};
 pub use shear_cell::{CellTest, Departure, ShearCell};
 pub use simulation::{
     ACCELERATION_TERM_CONDUCTIVITY, Counters, Gravity, SHAKING_FACTOR, Shaking, Simulation,

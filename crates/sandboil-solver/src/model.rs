@@ -1,14 +1,60 @@
 //! What is solved: nodes, regions, water and numerical choices, checked once.
 
 use crate::{boundary::Outline, error::SolverError};
-use sandboil_soil::Soil;
-use sandboil_sph::{Period, Vec2};
+use sandboil_soil::{Soil, VanGenuchten};
+use sandboil_sph::{Mat2, Period, Vec2};
 
 /// Stress nodes carried by each velocity node.
 pub const STRESS_NODES: usize = 2;
 
 /// Distance of a stress node from its velocity node over the particle spacing, along the diagonal (Section 3).
 const STRESS_NODE_DISTANCE: f64 = 1.0 / 3.0;
+
+/// Hydraulic conductivity by its principal values, m/s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conductivity {
+    /// Largest.
+    pub major: f64,
+    /// Smallest, at right angles.
+    pub minor: f64,
+    /// Unit vector of the largest.
+    pub direction: Vec2,
+}
+
+impl Conductivity {
+    /// The same in all directions; zero is undrained.
+    pub fn isotropic(value: f64) -> Self {
+        Self { major: value, minor: value, direction: Vec2::new(1.0, 0.0) }
+    }
+
+    /// Whether there is no direction.
+    pub fn is_isotropic(&self) -> bool {
+        self.major == self.minor
+    }
+
+    /// The tensor `k` of Eq. 3, m/s.
+    pub fn tensor(&self) -> Mat2 {
+        Mat2::identity() * self.minor
+            + self.direction * self.direction.transpose() * (self.major - self.minor)
+    }
+
+    fn validate(&self) -> Result<(), SolverError> {
+        let allowed = self.minor >= 0.0 && self.major >= self.minor && self.major.is_finite();
+        if !allowed || (self.minor == 0.0 && self.major > 0.0) {
+            let (name, value) = ("hydraulic_conductivity", self.minor);
+            let expected = "positive in every direction with the largest first, or zero in all";
+            return Err(SolverError::InvalidInput { name, value, expected });
+        }
+        if !((self.direction.norm() - 1.0).abs() < DIRECTION_TOLERANCE) {
+            let (name, value) = ("hydraulic_conductivity.direction", self.direction.norm());
+            return Err(SolverError::InvalidInput { name, value, expected: "a unit vector" });
+        }
+        Ok(())
+    }
+}
+
+/// Departure of a direction's length from one that rounding may leave.
+const DIRECTION_TOLERANCE: f64 = 1e-9;
 
 /// One region: a soil with its densities and conductivity.
 #[derive(Debug, Clone)]
@@ -19,8 +65,10 @@ pub struct Region {
     pub porosity: f64,
     /// Density of the solid grains, Mg/m3.
     pub solid_density: f64,
-    /// Isotropic hydraulic conductivity, m/s; zero is undrained.
-    pub hydraulic_conductivity: f64,
+    /// Hydraulic conductivity; zero is undrained.
+    pub hydraulic_conductivity: Conductivity,
+    /// Water retention above the water table; none: always saturated.
+    pub retention: Option<VanGenuchten>,
     /// Earth pressure coefficient of the geostatic start.
     pub earth_pressure_coefficient: f64,
     /// Poisson's ratio of the static stage; `K0 / (1 + K0)` keeps the earth pressure coefficient.
@@ -115,8 +163,10 @@ pub struct Model {
     /// Vertical effective stress of the geostatic start at each stress node, kPa, compression positive. Stress
     /// nodes `2 i` and `2 i + 1` belong to velocity node `i`, at plus and minus [`stress_node_offset`].
     pub vertical_effective_stress: Vec<f64>,
-    /// Hydrostatic pore pressure at each velocity node, kPa; read only when there is water.
+    /// Pore pressure at rest at each velocity node, kPa, negative in suction; read only when there is water.
     pub pore_pressure: Vec<f64>,
+    /// Degree of saturation at rest of each velocity node; empty: all pores are full.
+    pub saturation: Vec<f64>,
     /// Pore water, if the section has any.
     pub water: Option<Water>,
     /// Gravity, m/s2.
@@ -157,16 +207,27 @@ impl Model {
         (1.0 - porosity) * solid_density + water
     }
 
+    /// Degree of saturation of a node.
+    pub fn saturation(&self, node: usize) -> f64 {
+        self.saturation.get(node).copied().unwrap_or(1.0)
+    }
+
+    /// Part of the pore pressure at rest that pushes the grains apart, `S_r p` (Bishop's stress), kPa.
+    pub fn neutral_stress(&self) -> Vec<f64> {
+        self.pore_pressure.iter().enumerate().map(|(node, p)| self.saturation(node) * p).collect()
+    }
+
     /// Stiffness `K_f / n` of the pore water in undrained compression, kPa; zero without water.
     pub fn water_stiffness(&self, porosity: f64) -> f64 {
         self.water.map_or(0.0, |water| water.bulk_modulus / porosity)
     }
 
-    /// Pressure diffusivity `kappa = k / C` of a region, m2/s, with the storage `C = n gamma_f / K_f` of Eq. 3.
-    pub fn pressure_diffusivity(&self, region: usize) -> f64 {
+    /// Pressure diffusivity `kappa = k / C` of a region by a principal conductivity, m2/s, with the storage
+    /// `C = n gamma_f / K_f` of Eq. 3.
+    pub fn pressure_diffusivity(&self, region: usize, principal: impl Fn(Conductivity) -> f64) -> f64 {
         self.water.map_or(0.0, |water| {
             let Region { hydraulic_conductivity, porosity, .. } = self.regions[region];
-            hydraulic_conductivity * self.water_stiffness(porosity) / water.unit_weight
+            principal(hydraulic_conductivity) * self.water_stiffness(porosity) / water.unit_weight
         })
     }
 
@@ -181,6 +242,7 @@ impl Model {
             ("surface_elevation", self.surface_elevation.len(), nodes),
             ("vertical_effective_stress", self.vertical_effective_stress.len(), STRESS_NODES * nodes),
             ("pore_pressure", self.pore_pressure.len(), if self.water.is_some() { nodes } else { 0 }),
+            ("saturation", self.saturation.len(), if self.saturation.is_empty() { 0 } else { nodes }),
         ];
         for (name, found, expected) in shapes {
             if found != expected {
@@ -217,10 +279,7 @@ impl Model {
             }
             positive("solid_density", region.solid_density)?;
             positive("earth_pressure_coefficient", region.earth_pressure_coefficient)?;
-            if !(region.hydraulic_conductivity >= 0.0 && region.hydraulic_conductivity.is_finite()) {
-                let (name, value) = ("hydraulic_conductivity", region.hydraulic_conductivity);
-                return Err(SolverError::InvalidInput { name, value, expected: "zero or positive" });
-            }
+            region.hydraulic_conductivity.validate()?;
         }
         if let Some(&region) = self.region.iter().find(|&&region| region as usize >= self.regions.len()) {
             let (name, value) = ("region", f64::from(region));
@@ -229,7 +288,13 @@ impl Model {
         finite("position", self.position.iter().flat_map(|x| [x.x, x.y]))?;
         finite("surface_elevation", self.surface_elevation.iter().copied())?;
         finite("vertical_effective_stress", self.vertical_effective_stress.iter().copied())?;
-        finite("pore_pressure", self.pore_pressure.iter().copied())
+        finite("pore_pressure", self.pore_pressure.iter().copied())?;
+        match self.saturation.iter().find(|share| !(0.0..=1.0).contains(*share)) {
+            Some(&value) => {
+                Err(SolverError::InvalidInput { name: "saturation", value, expected: "in [0, 1]" })
+            }
+            None => Ok(()),
+        }
     }
 }
 

@@ -24,8 +24,8 @@ pub struct Phases {
     solid: Vec<f64>,
     /// Density of the grains, Mg/m3.
     solid_density: Vec<f64>,
-    /// Density of the water, Mg/m3; zero in a dry section.
-    water_density: f64,
+    /// Mass of water per volume of pores, Mg/m3; zero in a dry section.
+    water_density: Vec<f64>,
 }
 
 impl Phases {
@@ -39,7 +39,13 @@ impl Phases {
         Self {
             solid: volume.iter().zip(solidity).map(|(v, share)| v * share).collect(),
             solid_density: of_region(&|region| region.solid_density),
-            water_density: model.water.map_or(0.0, |water| water.unit_weight / model.gravity),
+            water_density: (0..model.nodes())
+                .map(|node| {
+                    model
+                        .water
+                        .map_or(0.0, |water| model.saturation(node) * water.unit_weight / model.gravity)
+                })
+                .collect(),
             unstrained: volume.clone(),
             volume,
         }
@@ -63,7 +69,7 @@ impl Phases {
     /// Mass of grains and pore water, Mg/m.
     pub fn mass(&self, node: usize) -> f64 {
         let pores = self.volume[node] - self.solid[node];
-        self.solid[node] * self.solid_density[node] + pores * self.water_density
+        self.solid[node] * self.solid_density[node] + pores * self.water_density[node]
     }
 
     /// Takes over the volume strain of the stress nodes. Returns how many porosities had to be kept in range.
@@ -90,7 +96,7 @@ impl Phases {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        4 * size_of_val(self.volume.as_slice())
+        5 * size_of_val(self.volume.as_slice())
     }
 }
 

@@ -260,8 +260,8 @@ impl Simulation {
         let gravity = Vec2::new(0.0, -self.model.gravity);
         self.constant_force = self.mass.iter().map(|mass| gravity * *mass).collect();
         if self.model.water.is_some() {
-            let (volume, pressure) = (self.phases.volume(), &self.model.pore_pressure);
-            let gradient = consistent_gradient(&self.model, &self.position, volume, pressure);
+            let (volume, pressure) = (self.phases.volume(), self.model.neutral_stress());
+            let gradient = consistent_gradient(&self.model, &self.position, volume, &pressure);
             for ((force, gradient), volume) in self.constant_force.iter_mut().zip(gradient).zip(volume) {
                 *force -= gradient * *volume;
             }
@@ -569,7 +569,8 @@ impl Simulation {
 
     fn flow_scheme(&self, factor: f64) -> FlowScheme {
         let numerics = self.model.numerics;
-        let conductivity = self.model.regions.iter().map(|r| r.hydraulic_conductivity).fold(0.0, f64::max);
+        let conductivity =
+            self.model.regions.iter().map(|r| r.hydraulic_conductivity.major).fold(0.0, f64::max);
         if conductivity == 0.0 {
             return FlowScheme::Undrained;
         }
@@ -1335,7 +1336,7 @@ fn channel_names(water: bool, stress: bool) -> Vec<&'static str> {
 
 /// The model with nodes sorted by region, then by row and column of the lattice, and the user's index of each:
 /// soil loops run over contiguous rows of one law, and neighbours lie near in memory.
-fn sorted(model: &Model) -> (Model, Vec<usize>) {
+pub(crate) fn sorted(model: &Model) -> (Model, Vec<usize>) {
     let lowest = model.position.iter().map(|x| x.y).fold(f64::INFINITY, f64::min);
     let row = |i: usize| ((model.position[i].y - lowest) / model.spacing.y).round();
     let mut order: Vec<usize> = (0..model.nodes()).collect();
@@ -1353,6 +1354,7 @@ fn sorted(model: &Model) -> (Model, Vec<usize>) {
             .flat_map(|&i| [0, 1].map(|k| model.vertical_effective_stress[STRESS_NODES * i + k]))
             .collect(),
         pore_pressure: order.iter().filter_map(|&i| model.pore_pressure.get(i).copied()).collect(),
+        saturation: order.iter().filter_map(|&i| model.saturation.get(i).copied()).collect(),
         ..model.clone()
     };
     (sorted, order)

@@ -185,7 +185,7 @@ pub fn region_limit(
         return drained;
     }
     let water = model.water_stiffness(model.regions[region].porosity);
-    let diffusivity = model.pressure_diffusivity(region);
+    let diffusivity = model.pressure_diffusivity(region, |k| k.major);
     let coefficient = if diffusivity > 0.0 { UNDRAINED_COEFFICIENT } else { FREE_UNDRAINED_COEFFICIENT };
     let undrained = wave(coefficient, skeleton_stiffness + water, Criterion::UndrainedWave);
     let combined = if undrained.0 < drained.0 { undrained } else { drained };
@@ -199,6 +199,8 @@ pub fn region_limit(
         return (both, if diffusion < combined.0 { Criterion::Diffusion } else { combined.1 });
     }
     let left = left_by_damping(filter + viscous(longest));
+    // Across the grain the water drains last.
+    let diffusivity = model.pressure_diffusivity(region, |k| k.minor);
     // Water that drains at grid scale within a step stiffens the short waves no more.
     let stable =
         |dt: f64| (dt / drained.0).powi(2) + spectrum.share(water / density, diffusivity, dt / left) <= 1.0;

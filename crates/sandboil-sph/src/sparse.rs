@@ -92,6 +92,27 @@ impl<T: Copy + std::ops::MulAssign<f64>> Csr<T> {
     }
 }
 
+impl<T: Copy + std::ops::MulAssign<f64>> Csr<T> {
+    /// Multiplies every entry by the factor of its row.
+    pub fn scale_by_row(&mut self, factor: &[f64]) {
+        for (row, factor) in factor.iter().enumerate() {
+            let span = self.span(row);
+            for value in &mut self.value[span] {
+                *value *= *factor;
+            }
+        }
+    }
+}
+
+impl<T: Copy> Csr<T> {
+    /// Replaces every entry by its image.
+    pub fn map_values(&mut self, image: impl Fn(T) -> T) {
+        for value in &mut self.value {
+            *value = image(*value);
+        }
+    }
+}
+
 impl<T> Csr<T> {
     /// Number of rows.
     pub fn rows(&self) -> usize {

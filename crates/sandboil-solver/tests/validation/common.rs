@@ -2,8 +2,8 @@
 
 use sandboil_soil::{Integrator, Soil, elastic::Elastic};
 use sandboil_solver::{
-    AccelerationTerm, Base, Diffusion, Model, Numerics, Operators, Outline, Region, SHAKING_FACTOR, Shaking,
-    UpgoingWave, Water, stress_node_offset,
+    AccelerationTerm, Base, Conductivity, Diffusion, Model, Numerics, Operators, Outline, Region,
+    SHAKING_FACTOR, Shaking, UpgoingWave, Water, stress_node_offset,
 };
 use sandboil_sph::{Period, Vec2};
 
@@ -40,6 +40,7 @@ pub fn column(height: f64, spacing: f64, columns: usize, region: Region, water: 
             .iter()
             .flat_map(|&x| [effective(x + offset), effective(x - offset)])
             .collect(),
+        saturation: Vec::new(),
         pore_pressure: match water {
             Some(water) => position.iter().map(|x| water.unit_weight * (height - x.y)).collect(),
             None => Vec::new(),
@@ -60,7 +61,8 @@ pub fn elastic(shear_modulus: f64, bulk_modulus: f64) -> Region {
         soil: Soil::Elastic(Elastic::new(shear_modulus, bulk_modulus).unwrap()),
         porosity: 0.4,
         solid_density: 2.0 / 0.6,
-        hydraulic_conductivity: 0.0,
+        hydraulic_conductivity: Conductivity::isotropic(0.0),
+        retention: None,
         earth_pressure_coefficient: 0.5,
         static_poisson_ratio: 1.0 / 3.0,
     }

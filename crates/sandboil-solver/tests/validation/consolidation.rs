@@ -1,7 +1,7 @@
 //! One-dimensional consolidation against Terzaghi's series.
 
 use crate::common::{column, elastic, shaking};
-use sandboil_solver::{Diffusion, Simulation, Water};
+use sandboil_solver::{Conductivity, Diffusion, Simulation, Water};
 use std::f64::consts::PI;
 
 const HEIGHT: f64 = 1.0;
@@ -25,7 +25,7 @@ fn series(height: f64, time_factor: f64) -> f64 {
 /// Root mean square of `p/p0` less the series over the rows, at time factors 0.05, 0.2 and 0.5.
 fn errors(rows: usize, smoothing_ratio: f64, diffusion: Diffusion) -> [f64; 3] {
     let mut region = elastic(SHEAR, BULK);
-    region.hydraulic_conductivity = CONDUCTIVITY;
+    region.hydraulic_conductivity = Conductivity::isotropic(CONDUCTIVITY);
     let porosity = region.porosity;
     let water = Water { unit_weight: UNIT_WEIGHT, bulk_modulus: 1e6 };
     let mut model = column(HEIGHT, HEIGHT / rows as f64, 1, region, Some(water));

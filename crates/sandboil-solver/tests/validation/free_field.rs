@@ -5,7 +5,7 @@ use crate::{
     stages::at_rest,
     waves::ricker,
 };
-use sandboil_solver::{Base, Model, Region, Shaking, Side, Support, UpgoingWave, Water};
+use sandboil_solver::{Base, Conductivity, Model, Region, Shaking, Side, Support, UpgoingWave, Water};
 
 const HEIGHT: f64 = 10.0;
 const SPACING: f64 = 0.2;
@@ -40,7 +40,7 @@ fn a_block_follows_its_column() {
         [("dry", None, 0.0), ("undrained", Some(WATER), 0.0), ("draining", Some(WATER), 1e-3)]
     {
         let mut region = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
-        region.hydraulic_conductivity = conductivity;
+        region.hydraulic_conductivity = Conductivity::isotropic(conductivity);
         let mut wide = at_rest(&block(HEIGHT, SPACING, COLUMNS, region.clone(), water));
         let mut narrow = at_rest(&column(HEIGHT, SPACING, 1, region, water));
         let stage = shaking(Some(pulse(5.0, 0.1)), 0.8, Vec::new());
@@ -77,7 +77,7 @@ fn a_block_follows_its_column() {
 fn a_recorded_column_does_what_the_solved_one_did() {
     const INTERVAL: f64 = 2.5e-3;
     let mut region = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
-    region.hydraulic_conductivity = 1e-3;
+    region.hydraulic_conductivity = Conductivity::isotropic(1e-3);
     let model = block(HEIGHT, SPACING, 10, region, Some(WATER));
     let stage = on_free_field(shaking(Some(pulse(5.0, 0.1)), 0.5, Vec::new()));
     let mut solved = at_rest(&model);
@@ -134,7 +134,7 @@ fn stages_and_renewals_strike_no_blow() {
         UpgoingWave::shear(INTERVAL, (0..1000).map(velocity).collect())
     };
     let mut region = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
-    region.hydraulic_conductivity = 1e-4;
+    region.hydraulic_conductivity = Conductivity::isotropic(1e-4);
     let run = |stages: &[(f64, f64)], strain_limit: Option<f64>| {
         let mut model = block(HEIGHT, 0.5, 8, region.clone(), Some(WATER));
         model.numerics.geometry_strain_limit = strain_limit;

@@ -5,7 +5,9 @@ use sandboil_soil::{
     Soil,
     pm4sand::{Options, PM4Sand, Parameters},
 };
-use sandboil_solver::{Gravity, HalfSpace, Model, Operators, Rayleigh, Simulation, UpgoingWave, Water};
+use sandboil_solver::{
+    Conductivity, Gravity, HalfSpace, Model, Operators, Rayleigh, Simulation, UpgoingWave, Water,
+};
 use std::f64::consts::PI;
 
 const HEIGHT: f64 = 10.0;
@@ -17,7 +19,7 @@ fn sand_column(operators: Operators) -> Model {
     let mut region = elastic(1.0, 1.0);
     let parameters = Parameters { dr: 0.55, g0: 677.0, hpo: 0.4, ..Parameters::default() };
     region.soil = Soil::PM4Sand(Box::new(PM4Sand::new(parameters, Options::default()).unwrap()));
-    region.hydraulic_conductivity = 1e-3;
+    region.hydraulic_conductivity = Conductivity::isotropic(1e-3);
     let mut model = column(HEIGHT, SPACING, 1, region, Some(WATER));
     model.numerics.operators = operators;
     model
@@ -152,7 +154,7 @@ fn a_wide_section_of_low_permeability_calms_down() {
     for conductivity in [1e-9, 1e-6, 1e-4] {
         for smoothing_ratio in [1.2, 1.4] {
             let mut region = elastic(4e4, 8e4);
-            region.hydraulic_conductivity = conductivity;
+            region.hydraulic_conductivity = Conductivity::isotropic(conductivity);
             let mut model = column(6.0, 1.0, 24, region, Some(WATER));
             model.numerics.smoothing_ratio = smoothing_ratio;
             let mut simulation = at_rest(&model);
