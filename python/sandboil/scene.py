@@ -573,7 +573,8 @@ class Numerics(Model):
     fractions; `time_step_factor` is
     relative to the measured stability limit; beyond `geometry_strain_limit` the particle lists follow the
     motion (default 0.2, and 0.02 for the printed operators, which do not carry the deformation).
-    `dispersion_correction` keeps short waves from being slow while shaking, at shorter and dearer steps.
+    `dispersion_correction` keeps short waves from being slow while shaking, and contacts of soils and
+    the surface from being out of place for them, at shorter and dearer steps.
     """
 
     _label: ClassVar[str] = "numerics"

@@ -256,6 +256,11 @@ impl Geometry {
         }
     }
 
+    /// Adds to the gradients at some stress nodes, and to the force that is their transpose.
+    pub fn enhance(&mut self, more: BTreeMap<usize, Vec<(u32, VectorWeight)>>, nodes: usize) {
+        self.wall = Paired::new(self.wall.forward.with_more(more), nodes);
+    }
+
     /// Pairs between stress and velocity nodes, images folded.
     pub fn pairs(&self) -> usize {
         self.gradient.forward.entries()
@@ -514,6 +519,29 @@ pub fn point_weights(model: &Model, position: &[Vec2], points: &[Vec2]) -> Csr<f
             Ok(fit) => members.iter().enumerate().map(|(k, m)| (m.owner, fit.value_weight(k, m))).collect(),
             // Beside too few nodes for a fit the nearest one speaks for the point.
             Err(_) => nearest(position, at).into_iter().collect(),
+        };
+        table.push_row(&mut row);
+    }
+    table
+}
+
+/// Value of the linear fit at every stress node, as weights of the nodes that sum to one. Beyond an edge that is held the
+/// ground goes on as it is: images there count for their nodes.
+pub fn stress_node_values(model: &Model, position: &[Vec2], (outline, walls): (&Outline, Walls)) -> Csr<f64> {
+    let kernel = WendlandQuintic::new(model.smoothing_length());
+    let points = stress_node_positions(position, model.spacing);
+    let around = Surroundings::new(position, outline, walls, kernel.support());
+    let list = NeighbourList::build(&points, &around.sources, kernel.support(), 0.0, model.period);
+    let volume = vec![0.0; position.len()];
+    let stencils = Stencils { around: &around, volume: &volume, kernel, period: model.period };
+    let mut table = Csr::with_capacity(points.len(), list.pairs());
+    for (s, &at) in points.iter().enumerate() {
+        let members =
+            stencils.showing(&stencils.all(&list, s, at), |image| image.strain[0] && image.strain[1]);
+        let mut row: Vec<_> = match LeastSquaresFit::new(&members, kernel) {
+            Ok(fit) => members.iter().enumerate().map(|(k, m)| (m.owner, fit.value_weight(k, m))).collect(),
+            // A detached grain keeps its mass.
+            Err(_) => vec![(id(s / STRESS_NODES), 1.0)],
         };
         table.push_row(&mut row);
     }

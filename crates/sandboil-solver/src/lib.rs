@@ -10,6 +10,7 @@ mod bins;
 pub mod boundary;
 pub mod column;
 mod conduction;
+mod contacts;
 mod deformation;
 mod dispersion;
 pub mod error;

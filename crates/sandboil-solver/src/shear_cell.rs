@@ -383,7 +383,7 @@ impl ShearCell {
     fn limit(&self) -> f64 {
         let stiffest = self.points.iter().map(|point| point.stiffness).fold(0.0, f64::max);
         SHAKING_FACTOR
-            * region_limit(&self.model, 0, stiffest, PressureCoupling::None, &self.spectrum, None, 1.0).0
+            * region_limit(&self.model, 0, stiffest, PressureCoupling::None, &self.spectrum, None, false).0
     }
 
     /// Advances by at most `steps` steps; returns whether the test has reached its end.

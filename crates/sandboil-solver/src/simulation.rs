@@ -4,12 +4,13 @@ use crate::{
     base::{Base, CompliantBase, Impedance, Vertical},
     boundary::{EdgeNodes, Outline, Walls, base_condition},
     column::ColumnRecord,
+    contacts::Contacts,
     deformation::Deformation,
-    dispersion::Dispersion,
+    dispersion::{Dispersion, lumped_masses},
     error::SolverError,
     flow::{Flow, FlowScheme},
     free_field::{FreeField, Section},
-    geometry::{Geometry, consistent_gradient, point_weights, stress_node_positions},
+    geometry::{Geometry, consistent_gradient, point_weights, stress_node_positions, stress_node_values},
     model::{AccelerationTerm, Diffusion, Model, Operators, STRESS_NODES},
     parallel::{Rows, chunks, for_each_chunk},
     phases::Phases,
@@ -20,7 +21,7 @@ use crate::{
         motion,
     },
     soil_field::SoilField,
-    timestep::{CORRECTED_RESPONSE, Criterion, PressureCoupling, PressureSpectrum, region_limit},
+    timestep::{Criterion, PressureCoupling, PressureSpectrum, region_limit},
 };
 use sandboil_soil::{Stress, UpdateReport};
 use sandboil_sph::Vec2;
@@ -168,6 +169,7 @@ pub struct Simulation {
     printed_stress: Option<PrintedStress>,
     rayleigh: Option<RayleighDamping>,
     dispersion: Option<Dispersion>,
+    contacts: Option<Contacts>,
     active: Active,
     time: f64,
     step: u64,
@@ -229,6 +231,7 @@ impl Simulation {
             geometry,
             rayleigh: None,
             dispersion: None,
+            contacts: None,
             active: Active::None,
             time: 0.0,
             step: 0,
@@ -251,12 +254,12 @@ impl Simulation {
     pub fn begin_gravity(&mut self, stage: Gravity) -> Result<(), SolverError> {
         self.gravity = Some(stage);
         self.released = None;
+        // Statics know no waves, and the edges that they hold bring back the geometry and masses that they know.
+        (self.dispersion, self.contacts) = (None, None);
         self.set_walls(Walls::statics(&self.model.outline));
         self.soil = SoilField::elastic(&self.model, &mut self.points)?;
         self.flow = None;
         self.rayleigh = None;
-        // Statics know no waves.
-        self.dispersion = None;
         let gravity = Vec2::new(0.0, -self.model.gravity);
         self.constant_force = self.mass.iter().map(|mass| gravity * *mass).collect();
         if self.model.water.is_some() {
@@ -329,6 +332,8 @@ impl Simulation {
             self.velocity.fill(Vec2::zeros());
             self.acceleration.fill(Vec2::zeros());
             self.soil = SoilField::plastic(&self.model, &mut self.points, None)?;
+            self.contacts = corrected.then(|| Contacts::new(&self.model, &self.points));
+            self.sharpen_contacts();
         }
         self.phases.restart_strain();
         for point in &mut self.points {
@@ -534,6 +539,18 @@ impl Simulation {
             flow.geometry_changed(&self.model, &self.phases);
         }
         self.counters.geometry_builds += 1;
+        self.sharpen_contacts();
+    }
+
+    /// Lets waves see contacts and edges as they are, if inertia is corrected for them: strain with its kinks, and the
+    /// masses that the operators give.
+    fn sharpen_contacts(&mut self) {
+        let Some(contacts) = &self.contacts else { return };
+        let outline = self.present_outline();
+        let value = stress_node_values(&self.model, &self.position, (&outline, self.walls));
+        self.mass = lumped_masses(&value, &self.points, self.model.nodes());
+        let changed = (&mut self.geometry, self.mass.as_mut_slice());
+        contacts.sharpen(&self.model, &self.position, &self.points, &value, changed);
     }
 
     /// Volumes, densities and masses of the present strain, from which deformation starts anew.
@@ -607,7 +624,7 @@ impl Simulation {
         coupling: PressureCoupling,
         factor: f64,
     ) -> (f64, Criterion) {
-        let response = if self.dispersion.is_some() { CORRECTED_RESPONSE } else { 1.0 };
+        let corrected = self.dispersion.is_some();
         let mut stiffest = vec![0.0_f64; self.model.regions.len()];
         for (s, point) in self.points.iter().enumerate() {
             let slot = &mut stiffest[self.model.region[s / STRESS_NODES] as usize];
@@ -618,7 +635,7 @@ impl Simulation {
             .enumerate()
             .filter(|(_, stiffness)| **stiffness > 0.0)
             .map(|(region, &stiffness)| {
-                region_limit(&self.model, region, stiffness, coupling, &self.spectrum, rayleigh, response)
+                region_limit(&self.model, region, stiffness, coupling, &self.spectrum, rayleigh, corrected)
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .unwrap_or_default();
@@ -1205,7 +1222,8 @@ impl Simulation {
             arrays.push(("viscous_stress", rayleigh.bytes()));
         }
         if let Some(dispersion) = &self.dispersion {
-            arrays.push(("inertia_correction", dispersion.bytes()));
+            let contacts = self.contacts.as_ref().map_or(0, Contacts::bytes);
+            arrays.push(("inertia_correction", dispersion.bytes() + contacts));
         }
         if let Active::Shaking(shaking) = &self.active {
             arrays.push(("base", shaking.base.bytes()));

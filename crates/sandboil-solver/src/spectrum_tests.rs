@@ -293,23 +293,18 @@ fn the_printed_form_has_growing_modes() {
     assert!((1e-3..5e-2).contains(&rate), "{rate}");
 }
 
-/// Damping matrix of the velocity filter on a block without stress, per unit mass: `-M^-1 dF/dv`.
-pub fn filter_matrix(model: &Model, strength: f64, shear_modulus: f64) -> DMatrix<f64> {
-    let nodes = model.nodes();
-    let volume = vec![1.0; nodes];
-    let walls = (&model.outline, Walls::statics(&model.outline));
-    let geometry = Geometry::build(model, &model.position, &volume, walls, None);
-    let point = StressPoint { density: 1.0, volume: 0.5, shear_modulus, ..StressPoint::default() };
-    let points = vec![point; STRESS_NODES * nodes];
+/// Damping matrix of the velocity filter on stress nodes without stress: `-dF/dv`.
+pub fn filter_matrix(geometry: &Geometry, points: &[StressPoint], strength: f64) -> DMatrix<f64> {
+    let nodes = points.len() / STRESS_NODES;
     let mut matrix = DMatrix::zeros(2 * nodes, 2 * nodes);
     for column in 0..2 * nodes {
         let mut velocity = vec![Vec2::zeros(); nodes];
         velocity[column / 2][column % 2] = 1.0;
         let shares: Vec<_> = (0..points.len())
-            .map(|s| motion(&geometry, s, &velocity).share(&points[s], geometry.covariance[s], strength))
+            .map(|s| motion(geometry, s, &velocity).share(&points[s], geometry.covariance[s], strength))
             .collect();
         for j in 0..nodes {
-            let force = conservative_force(&geometry, j, velocity[j], &shares, &points);
+            let force = conservative_force(geometry, j, velocity[j], &shares, points);
             matrix[(2 * j, column)] = -force.x;
             matrix[(2 * j + 1, column)] = -force.y;
         }
@@ -322,8 +317,11 @@ pub fn filter_matrix(model: &Model, strength: f64, shear_modulus: f64) -> DMatri
 #[test]
 fn strength_of_the_velocity_filter() {
     let model = square_block(10);
+    let walls = (&model.outline, Walls::statics(&model.outline));
+    let geometry = Geometry::build(&model, &model.position, &vec![1.0; model.nodes()], walls, None);
     for (shear_modulus, speed) in [(1e4, 100.0), (1.0, 20.0), (0.0, 20.0)] {
-        let matrix = filter_matrix(&model, 0.1, shear_modulus);
+        let point = StressPoint { density: 1.0, volume: 0.5, shear_modulus, ..StressPoint::default() };
+        let matrix = filter_matrix(&geometry, &vec![point; STRESS_NODES * model.nodes()], 0.1);
         assert!((&matrix - matrix.transpose()).amax() < 1e-14 * speed);
         let eigenvalues = matrix.symmetric_eigenvalues();
         let largest = eigenvalues.max() / (0.1 * speed);

@@ -11,9 +11,11 @@ use sandboil_sph::{
 
 /// Limit of the skeleton wave over `h / c_d` with free surfaces: 0.994 at h = 1.4 dx, where it is least.
 pub const DRAINED_COEFFICIENT: f64 = 0.99;
-/// Largest factor of dispersion-corrected inertia on the squared frequency of any wave, and on the rate of its damping:
-/// the limit becomes `0.73 h / c_d` (0.735 at h = 1.4 dx and Poisson's ratio zero, where it is least).
-pub const CORRECTED_RESPONSE: f64 = (DRAINED_COEFFICIENT / 0.73) * (DRAINED_COEFFICIENT / 0.73);
+/// Largest factor of dispersion-corrected inertia on the squared frequency of any wave: the limit becomes `0.71 h / c_d`
+/// (0.713 at h = 1.4 dx and Poisson's ratio zero, where it is least).
+pub const CORRECTED_RESPONSE: f64 = (DRAINED_COEFFICIENT / 0.71) * (DRAINED_COEFFICIENT / 0.71);
+/// The same on the rates of the velocity filter (2.53 at h = 1.4 dx).
+pub const CORRECTED_FILTER: f64 = 2.55;
 /// Limit of the undrained wave over `h / c_u`, surfaces at prescribed pressure.
 const UNDRAINED_COEFFICIENT: f64 = 1.7;
 /// The same where pressure is prescribed nowhere: undrained soil.
@@ -156,8 +158,8 @@ fn left_by_damping(ratio: f64) -> f64 {
 /// Limit for one region at a skeleton stiffness `K + 4G/3` in kPa, s.
 ///
 /// `spectrum` belongs to implicit diffusion and is read only there. Rayleigh damping acts on the skeleton alone: its
-/// rate is that of the skeleton's fastest wave, whatever the water adds to the frequency. `response` is the largest
-/// factor on the acceleration that a force gives, one without correction of inertia.
+/// rate is that of the skeleton's fastest wave, whatever the water adds to the frequency. `corrected` says whether inertia
+/// is corrected for dispersion.
 pub fn region_limit(
     model: &Model,
     region: usize,
@@ -165,15 +167,16 @@ pub fn region_limit(
     coupling: PressureCoupling,
     spectrum: &PressureSpectrum,
     rayleigh: Option<&Rayleigh>,
-    response: f64,
+    corrected: bool,
 ) -> (f64, Criterion) {
     let h = model.smoothing_length();
+    let (response, filtered) = if corrected { (CORRECTED_RESPONSE, CORRECTED_FILTER) } else { (1.0, 1.0) };
     let density = model.mixture_density(region) / response;
     let undamped = |coefficient: f64, stiffness: f64| coefficient * h / (stiffness / density).sqrt();
     let longest = undamped(DRAINED_COEFFICIENT, skeleton_stiffness);
     let rate = rayleigh.map_or(0.0, |damping| damping.rate(2.0 / longest));
-    // The filter's rate rises with the response, the frequency that it is compared with by the root.
-    let (filter, viscous) = (filter_ratio(model) * response.sqrt(), |limit: f64| 0.25 * rate * limit);
+    let filter = filter_ratio(model) * filtered / response.sqrt();
+    let viscous = |limit: f64| 0.25 * rate * limit;
     let wave = |coefficient: f64, stiffness: f64, criterion: Criterion| {
         let limit = undamped(coefficient, stiffness);
         let ratio = viscous(limit);

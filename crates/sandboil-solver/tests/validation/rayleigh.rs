@@ -122,28 +122,25 @@ fn transfer_functions_of_layers() {
     }
 }
 
-/// With corrected inertia what remains is local. The surface moves too little: by 4 % at 20 spacings and a sixth of that
-/// at 50. The contact is too stiff, because strain is smooth across it: whatever the wave, it acts as if it lay `SHIFT`
-/// spacings inside the softer soil, and against the closed form of such layers little remains.
+/// With corrected inertia two layers are within 2 % of the closed form for waves of 20 spacings and more, at h/dx 1.0 and
+/// 1.2. A greater contrast, and one layer, whose resonances are the sharpest, take more from the time step: 1.9 % is left of
+/// one layer's 2.8 % at a sixth of the step.
 #[test]
 fn corrected_transfer_functions_of_layers() {
-    const RATIO: f64 = 1.2;
-    // From two such layers at rest under shear: the displacement that the contact takes too little.
-    const SHIFT: f64 = 0.13;
-    let moved = |layer: Layer, by: f64| Layer { thickness: layer.thickness + by * SPACING, ..layer };
-    let layers = [SOFT, STIFF];
-    let shifted = [moved(SOFT, -SHIFT), moved(STIFF, SHIFT)];
-    for (name, layers, exact, bounds) in [
-        ("one layer", &layers[..1], &layers[..1], [0.005, 0.005, 0.025, 0.06]),
-        ("two layers", &layers[..], &layers[..], [0.01, 0.02, 0.035, 0.08]),
-        ("contact moved", &layers[..], &shifted[..], [0.01, 0.01, 0.02, 0.04]),
+    let stiffer = Layer { speed: 400.0, ..STIFF };
+    for (ratio, name, layers, bounds) in [
+        (1.2, "one layer", &[SOFT][..], [0.005, 0.005, 0.015, 0.035]),
+        (1.2, "two layers", &[SOFT, STIFF], [0.005, 0.005, 0.01, 0.02]),
+        (1.0, "two layers", &[SOFT, STIFF], [0.005, 0.005, 0.01, 0.02]),
+        (1.4, "two layers", &[SOFT, STIFF], [0.005, 0.01, 0.02, 0.04]),
+        (1.2, "two layers of contrast 18", &[SOFT, stiffer], [0.005, 0.005, 0.01, 0.025]),
     ] {
         for damping in [None, Some(Rayleigh { ratio: 0.005, ..DAMPING }), Some(DAMPING)] {
             let mut model = layered(layers);
-            model.numerics.smoothing_ratio = RATIO;
+            model.numerics.smoothing_ratio = ratio;
             model.numerics.dispersion_correction = true;
-            let found = misfits(&model, exact, damping);
-            println!("{}", told(name, damping, found));
+            let found = misfits(&model, layers, damping);
+            println!("h/dx {ratio}, {}", told(name, damping, found));
             assert!(found.iter().zip(bounds).all(|(found, bound)| *found < bound), "{found:?}");
         }
     }
