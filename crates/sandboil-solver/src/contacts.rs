@@ -341,8 +341,10 @@ fn contacts_of(model: &Model, column: &[usize], stiffness: &[Stiffness]) -> Vec<
 mod tests {
     use super::*;
     use crate::{
-        boundary::Walls,
+        boundary::{Condition, Outline, Walls},
         dispersion::tests::{Block, layered},
+        geometry::stress_node_values,
+        model::Water,
         skeleton::{NodalShare, conservative_force, motion, tests::square_block},
     };
     use sandboil_soil::Stress;
@@ -466,6 +468,47 @@ mod tests {
             println!("slope {slope}: energy off by {:+.2} %", 100.0 * (found / exact - 1.0));
             assert!((found / exact - 1.0).abs() < 0.01, "{slope}: {found} {exact}");
         }
+    }
+
+    /// The kinks have the least energy, images beyond a base included: sharpening once more changes nothing.
+    #[test]
+    fn what_is_sharp_stays_as_it_is() {
+        let mut model = layered(square_block(SIDE), SIDE - 3);
+        model.outline = Outline::level(-0.5);
+        let walls = Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]);
+        let mut block = Block::new(&model, walls, &MODULI, 1.0);
+        let velocity: Vec<Vec2> =
+            (0..model.nodes()).map(|j| Vec2::new((1.3 * j as f64).sin(), (2.1 * j as f64).cos())).collect();
+        let strained = |block: &Block| -> Vec<(Vec2, Vec2)> {
+            (0..block.points.len()).map(|s| motion(&block.geometry, s, &velocity).gradient()).collect()
+        };
+        let once = strained(&block);
+        let value = stress_node_values(&model, &model.position, (&model.outline, walls));
+        let contacts = Contacts::new(&model, &block.points);
+        let changed = (&mut block.geometry, block.mass.as_mut_slice());
+        contacts.sharpen(&model, &model.position, &block.points, &value, changed);
+        for (once, twice) in once.iter().zip(strained(&block)) {
+            assert!((once.0 - twice.0).norm() + (once.1 - twice.1).norm() < 1e-12, "{once:?} {twice:?}");
+        }
+    }
+
+    /// Pore water that does not drain compresses both sides alike, whatever their skeletons; shear keeps its kink.
+    #[test]
+    fn pore_water_evens_compression() {
+        let mut model = layered(square_block(SIDE), SIDE / 2);
+        model.water = Some(Water { unit_weight: 10.0, bulk_modulus: 1e6 });
+        model.pore_pressure = vec![0.0; model.nodes()];
+        let block = sharp(&model);
+        let [compressed, sheared] = [Vec2::y(), Vec2::x()]
+            .map(|rate| model.position.iter().map(|at| rate * at.y).collect::<Vec<Vec2>>());
+        let strained = |s: usize| {
+            let (_, y) = motion(&block.geometry, s, &compressed).gradient();
+            let (x, _) = motion(&block.geometry, s, &sheared).gradient();
+            [(y.y - 1.0).abs(), (x.y - 1.0).abs()]
+        };
+        let most =
+            (0..block.points.len()).map(strained).fold([0.0_f64; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
+        assert!(most[0] < 1e-4 && most[1] > 0.1, "{most:?}");
     }
 
     /// Nothing changes between soils of nearly one stiffness, nor at layers thinner than the kernel's reach.

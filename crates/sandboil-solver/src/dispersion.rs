@@ -186,7 +186,7 @@ impl Dispersion {
 pub(crate) mod tests {
     use super::*;
     use crate::{
-        boundary::{Condition, Outline, Walls},
+        boundary::{Condition, Outline, Side, Support, Walls},
         contacts::Contacts,
         geometry::stress_node_values,
         model::STRESS_NODES,
@@ -305,6 +305,23 @@ pub(crate) mod tests {
                     assert!((&matrix * &rotation - &rotation).amax() < 1e-11);
                 }
             }
+        }
+    }
+
+    /// Beside a side that is held the ground goes on: nodes keep their own mass there, but not below a surface.
+    #[test]
+    fn nodes_beside_a_held_side_keep_their_mass() {
+        const SIDE: usize = 13;
+        let end = SIDE as f64 - 0.5;
+        let mut model = square_block(SIDE);
+        let side = |x: f64, support: Support| Some(Side { x, extent: [-0.5, end], support });
+        model.outline =
+            Outline { sides: [side(-0.5, Support::FreeSlip), side(end, Support::NoSlip)], ..Outline::none() };
+        let block = Block::new(&model, Walls::statics(&model.outline), &[[1.0, 3.0]], 1.0);
+        for (mass, at) in block.mass.iter().zip(&model.position) {
+            // The middle row takes part in no stencil that the surfaces cut.
+            assert!((at.y - 6.0).abs() > 0.5 || (mass - 1.0).abs() < 1e-12, "{at}: {mass}");
+            assert!(at.y < end - 1.0 || *mass > 1.1, "{at}: {mass}");
         }
     }
 
