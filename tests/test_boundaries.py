@@ -34,7 +34,6 @@ from sandboil import (
     plan,
     polygon,
 )
-from sandboil.discretise import BASE_CLEARANCE
 from sandboil.simulation import _description, _shaking_description, doubts, loaded_motions, probes_of
 
 ROCK = Elastic(E=2.0e5, nu=0.3)
@@ -163,10 +162,15 @@ def test_slopes_are_filled_and_carry_their_own_overburden(points: Any) -> None:
     surface = np.interp(x, *outline.surface.T)
     np.testing.assert_allclose(particles.surface_elevation, surface, atol=1e-4)
     np.testing.assert_allclose(particles.sigma_v_eff0, 18.0 * (surface - y), atol=2e-3)
-    assert (y - np.interp(x, *outline.base.T) >= BASE_CLEARANCE * 0.5 - 1e-9).all()
+    # The lowest particle of a column stands in the middle of a cell that reaches down to the base.
+    _, lowest = np.unique(x, return_index=True)
+    height = particles.volume[lowest] / particles.spacing[0]
+    np.testing.assert_allclose(y[lowest] - np.interp(x[lowest], *outline.base.T), 0.5 * height, atol=1e-9)
+    assert (np.abs(height / particles.spacing[1] - 1.0) <= 0.5 + 1e-6).all()
+    above = np.setdiff1d(np.arange(len(x)), lowest)
+    np.testing.assert_allclose(particles.volume[above], np.prod(particles.spacing))
 
 
-@pytest.mark.filterwarnings("ignore:scene.regions stand on a base that is not level")
 @pytest.mark.parametrize("angle", [5.0, -15.0])
 def test_ground_on_an_inclined_base_comes_to_rest_and_stays_there(angle: float) -> None:
     scene = slope(inclined(angle), stages=[Gravity(max_steps=5000), Shaking(duration=0.2)])
@@ -459,6 +463,15 @@ def test_a_motion_that_does_not_end_at_rest_is_told() -> None:
     assert f"warning: {told}" in page
     mended = slope(stages=shaken(drifting.baseline_corrected()))
     assert not doubts(mended, loaded_motions(mended))
+
+
+def test_a_smooth_base_that_is_not_level_is_told() -> None:
+    smooth = [Gravity(base="free-slip"), Shaking(duration=1.0)]
+    scene = slope(inclined(5.0), stages=smooth)
+    (told,) = doubts(scene, loaded_motions(scene))
+    assert told.startswith("scene.stages[0].base = 'free-slip' above a base that is not level")
+    for sound in (slope(inclined(5.0)), slope(stages=smooth)):
+        assert not doubts(sound, loaded_motions(sound))
 
 
 def test_a_stage_that_ends_before_a_delayed_motion_is_told() -> None:

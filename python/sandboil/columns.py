@@ -90,6 +90,7 @@ def key(section: dict[str, Any], stage: dict[str, Any], hand: str, tolerance: fl
         "version": _core.__version__,
         "tolerance": tolerance,
         "y": position[rows, 1],
+        "volume": section["volume"][rows],
         "soils": [section["regions"][region] for region in section["region"][rows]],
         "surface": section["surface_elevation"][rows],
         "stress": stress,

@@ -634,12 +634,12 @@ def _stage_motions(scene: Scene, stage: Shaking, path: str) -> StageMotions:
 def doubts(scene: Scene, loaded: list[StageMotions | None]) -> list[str]:
     """Why the answer may not be what was meant; empty if there is no reason known."""
     told = []
-    if not scene.outline.base_is_level:
-        told.append(
-            "scene.regions stand on a base that is not level: stresses at rest in rows above it alternate "
-            "by up to 70 %, by 5 % ten rows up; keep soil whose strength matters away from it"
-        )
     for i, (stage, motions) in enumerate(zip(scene.stages, loaded, strict=True)):
+        if isinstance(stage, Gravity) and stage.base == "free-slip" and not scene.outline.base_is_level:
+            told.append(
+                f"scene.stages[{i}].base = {stage.base!r} above a base that is not level: stresses at rest "
+                "in rows above it alternate by up to 70 %; 'no-slip' leaves 4 %"
+            )
         if not isinstance(stage, Shaking) or motions is None:
             continue
         path = f"scene.stages[{i}]"
@@ -681,6 +681,7 @@ def _description(scene: Scene, particles: Discretisation) -> dict[str, Any]:
     return {
         "spacing": particles.spacing,
         "position": particles.position,
+        "volume": particles.volume,
         "region": particles.region.astype(np.uint32),
         "regions": [_region(scene, region) for region in scene.regions],
         "surface_elevation": particles.surface_elevation,

@@ -74,7 +74,6 @@ def moved(stood: sb.Scene) -> float:
     return found
 
 
-@pytest.mark.filterwarnings("ignore:scene.regions stand on a base that is not level")
 @pytest.mark.parametrize("wet", [False, True], ids=["dry", "submerged"])
 @pytest.mark.parametrize("soil", SOILS)
 @pytest.mark.parametrize("shape", SHAPES)
@@ -84,7 +83,6 @@ def test_a_slope_stands_on_free_edges(shape: str, soil: str, wet: bool) -> None:
     assert moved(scene(shape, soil, wet=wet, vertical=vertical, duration=5.0)) < REST
 
 
-@pytest.mark.filterwarnings("ignore:scene.regions stand on a base that is not level")
 @pytest.mark.slow
 @pytest.mark.parametrize("vertical", ["roller", "absorbing"])
 @pytest.mark.parametrize("wet", [False, True], ids=["dry", "submerged"])

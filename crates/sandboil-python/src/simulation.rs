@@ -165,6 +165,7 @@ pub fn model(dict: &Bound<'_, PyDict>) -> PyResult<solver::Model> {
     Ok(solver::Model {
         spacing: solver::Vec2::new(dx, dy),
         position: vectors(&get(dict, "position")?),
+        volume: floats("volume")?,
         region: get::<PyReadonlyArray1<'_, u32>>(dict, "region")?.as_slice()?.to_vec(),
         regions: regions.iter().map(|entry| region(entry, gap_memory)).collect::<PyResult<_>>()?,
         surface_elevation: floats("surface_elevation")?,

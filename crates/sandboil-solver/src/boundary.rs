@@ -128,6 +128,11 @@ impl Outline {
         self.base.iter().map(|point| point.y).fold(f64::INFINITY, f64::min)
     }
 
+    /// Height of the highest point of the base over the lowest, m; zero if there is none.
+    pub fn relief(&self) -> f64 {
+        (self.base.iter().map(|point| point.y).fold(f64::NEG_INFINITY, f64::max) - self.lowest()).max(0.0)
+    }
+
     /// Elevation of the base at `x`, m; its end segments go on beyond its ends.
     pub fn base_elevation(&self, x: f64) -> f64 {
         self.base_segment(x).map_or(f64::NEG_INFINITY, |[a, b]| a.y + (b.y - a.y) * (x - a.x) / (b.x - a.x))
@@ -144,7 +149,7 @@ impl Outline {
     }
 
     /// The nearest point of the base, and the outward normal there.
-    fn nearest_on_base(&self, at: Vec2) -> Option<(Vec2, Vec2)> {
+    pub(crate) fn nearest_on_base(&self, at: Vec2) -> Option<(Vec2, Vec2)> {
         nearest_on(&self.base, at)
     }
 

@@ -388,6 +388,7 @@ fn column_model(section: &Section, hand: Hand) -> Model {
     let middle = 0.5 * model.spacing.x;
     Model {
         position: nodes.iter().map(|&node| Vec2::new(middle, model.position[node].y)).collect(),
+        volume: pick(&model.volume),
         region: nodes.iter().map(|&node| model.region[node]).collect(),
         surface_elevation: pick(&model.surface_elevation),
         vertical_effective_stress: nodes
@@ -414,6 +415,7 @@ fn same_column(a: &Model, b: &Model) -> bool {
     let heights = |model: &Model| model.position.iter().map(|x| x.y).collect::<Vec<_>>();
     a.region == b.region
         && close(&heights(a), &heights(b))
+        && close(&a.volume, &b.volume)
         && close(&a.vertical_effective_stress, &b.vertical_effective_stress)
         && close(&a.pore_pressure, &b.pore_pressure)
         && close(&a.saturation, &b.saturation)

@@ -1,6 +1,7 @@
 //! Weight tables of the current geometry. They stay frozen while strains are small.
 
 use crate::{
+    balance,
     boundary::{Condition, Outline, Surroundings, Walls, id},
     conduction::Conduction,
     model::{Model, Operators, STRESS_NODES, stress_node_offset},
@@ -33,7 +34,7 @@ impl VectorWeight {
     }
 
     /// One component by itself.
-    fn of_component(component: usize, gradient: Vec2, map: Mat2) -> Self {
+    pub fn of_component(component: usize, gradient: Vec2, map: Mat2) -> Self {
         let shown = [0, 1].map(|from| gradient * map[(component, from)]);
         let nothing = [Vec2::zeros(); 2];
         if component == 0 { Self { x: shown, y: nothing } } else { Self { x: nothing, y: shown } }
@@ -141,6 +142,8 @@ pub struct Geometry {
     pub flow: Option<FlowTables>,
     /// Tables of the printed operators, if chosen.
     pub printed: Option<PrintedTables>,
+    /// Whether weights near the base were changed to bring stress into balance.
+    pub is_balanced: bool,
     list: Lists,
 }
 
@@ -179,7 +182,7 @@ impl Stencils<'_> {
     }
 
     /// Velocity of a member from that of its node.
-    fn map(&self, member: &Member) -> Mat2 {
+    pub fn map(&self, member: &Member) -> Mat2 {
         self.around.image(member.source).map_or_else(Mat2::identity, |image| image.map)
     }
 }
@@ -226,6 +229,13 @@ impl Geometry {
             Operators::Conservative => least_squares_tables(&stencils, &list.from_stress, &stress_position),
             Operators::Printed => printed_strain_tables(&stencils, &list.from_stress, &stress_position),
         };
+        let is_balanced = balance::is_needed(model, outline, walls);
+        let wall_table = if is_balanced {
+            let of_stress = (&list.from_stress, stress_position.as_slice());
+            wall_table.with_more(balance::corrections(model, outline, &stencils, of_stress))
+        } else {
+            wall_table
+        };
         let flow = model
             .water
             .is_some()
@@ -239,6 +249,7 @@ impl Geometry {
             wall: Paired::new(wall_table, nodes),
             flow,
             printed,
+            is_balanced,
             list,
         }
     }
@@ -388,8 +399,7 @@ pub fn static_conduction(model: &Model) -> Conduction {
     let kernel = WendlandQuintic::new(model.smoothing_length());
     let (position, walls) = (&model.position, Walls::statics(&model.outline));
     let around = Surroundings::new(position, &model.outline, walls, kernel.support());
-    let volume = vec![model.spacing.x * model.spacing.y; model.nodes()];
-    let stencils = Stencils { around: &around, volume: &volume, kernel, period: model.period };
+    let stencils = Stencils { around: &around, volume: &model.volume, kernel, period: model.period };
     let directed = model.regions.iter().any(|region| !region.hydraulic_conductivity.is_isotropic());
     // Only anisotropic soil asks for gradients at stress nodes.
     let points = if directed { stress_node_positions(position, model.spacing) } else { Vec::new() };

@@ -4,6 +4,7 @@
 //! Equation numbers are those of Mhaski & Ramana (2025), CMES 142(1). Units: kN, m, s, Mg; stress tension
 //! positive, pore pressure compression positive; x horizontal, y up.
 
+mod balance;
 mod banded;
 pub mod base;
 mod bins;

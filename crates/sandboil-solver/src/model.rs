@@ -154,6 +154,8 @@ pub struct Model {
     pub spacing: Vec2,
     /// Velocity nodes, m.
     pub position: Vec<Vec2>,
+    /// Volume per unit thickness of each, m2: a cell of the lattice, save above a base that cuts the cells.
+    pub volume: Vec<f64>,
     /// Region of each velocity node.
     pub region: Vec<u32>,
     /// The regions.
@@ -192,7 +194,12 @@ impl Model {
 
     /// Length that stands for the particle spacing where only one is meant, m.
     pub fn mean_spacing(&self) -> f64 {
-        (self.spacing.x * self.spacing.y).sqrt()
+        self.cell().sqrt()
+    }
+
+    /// Volume of a cell of the lattice per unit thickness, m2.
+    pub fn cell(&self) -> f64 {
+        self.spacing.x * self.spacing.y
     }
 
     /// Smoothing length, m.
@@ -238,6 +245,7 @@ impl Model {
     pub fn validate(&self) -> Result<(), SolverError> {
         let nodes = self.nodes();
         let shapes = [
+            ("volume", self.volume.len(), nodes),
             ("region", self.region.len(), nodes),
             ("surface_elevation", self.surface_elevation.len(), nodes),
             ("vertical_effective_stress", self.vertical_effective_stress.len(), STRESS_NODES * nodes),
@@ -252,6 +260,9 @@ impl Model {
         positive("nodes", nodes as f64)?;
         positive("spacing.x", self.spacing.x)?;
         positive("spacing.y", self.spacing.y)?;
+        for &volume in &self.volume {
+            positive("volume", volume)?;
+        }
         positive("gravity", self.gravity)?;
         positive("smoothing_ratio", self.numerics.smoothing_ratio)?;
         positive("geometry_strain_limit", self.numerics.geometry_strain_limit())?;

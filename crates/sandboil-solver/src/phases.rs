@@ -31,7 +31,7 @@ pub struct Phases {
 impl Phases {
     /// The undeformed section.
     pub fn new(model: &Model) -> Self {
-        let volume = vec![model.spacing.x * model.spacing.y; model.nodes()];
+        let volume = model.volume.clone();
         let of_region = |value: &dyn Fn(&crate::Region) -> f64| -> Vec<f64> {
             model.region.iter().map(|&region| value(&model.regions[region as usize])).collect()
         };

@@ -98,7 +98,7 @@ pub struct Seepage {
     order: Vec<usize>,
     position: Vec<Vec2>,
     spacing: f64,
-    volume: f64,
+    volume: Vec<f64>,
     porosity: Vec<f64>,
     retention: Vec<Option<VanGenuchten>>,
     conductivity: Vec<f64>,
@@ -167,7 +167,7 @@ impl Seepage {
         let mut seepage = Self {
             water,
             spacing: model.spacing.y,
-            volume: model.spacing.x * model.spacing.y,
+            volume: model.volume.clone(),
             porosity: of_region(&|region| region.porosity),
             conductivity: of_region(&|region| region.hydraulic_conductivity.minor),
             retention: model.region.iter().map(|&region| model.regions[region as usize].retention).collect(),
@@ -392,14 +392,14 @@ impl Seepage {
 
     /// Water that node `i` has gained since a state, m3 per m.
     fn gained(&self, i: usize, head: &[f64], moisture: &[Moisture]) -> f64 {
-        let pores = self.volume * self.porosity[i];
+        let pores = self.volume[i] * self.porosity[i];
         let swelling = self.compressibility(i, &moisture[i]) * (self.head[i] - head[i]);
         pores * (self.moisture[i].saturation - moisture[i].saturation) + swelling
     }
 
     /// Water that node `i` takes up by its compression per metre of head, m2 per m: `V n S_r gamma_f / K_f`.
     fn compressibility(&self, i: usize, moisture: &Moisture) -> f64 {
-        self.volume * self.porosity[i] * moisture.saturation * self.water.unit_weight
+        self.volume[i] * self.porosity[i] * moisture.saturation * self.water.unit_weight
             / self.water.bulk_modulus
     }
 
@@ -442,7 +442,7 @@ impl Seepage {
                 let along = self.flow_along(&relative, &self.head);
                 let (mut storage, mut largest) = (vec![0.0; self.head.len()], 0.0_f64);
                 for (i, storage) in storage.iter_mut().enumerate() {
-                    let pores = self.volume * self.porosity[i];
+                    let pores = self.volume[i] * self.porosity[i];
                     let own = self.head[i];
                     // Content and slope at the present heads, the outer curve along its tangent.
                     let (content, slope) = self.content(i, own, outer[i]);

@@ -136,6 +136,7 @@ impl CellTest {
         let model = Model {
             spacing: Vec2::repeat(self.spacing),
             position: order.iter().map(|&k| lattice[k]).collect(),
+            volume: vec![self.spacing * self.spacing; nodes],
             region: vec![0; nodes],
             // Without pores the mixture has the density given.
             regions: vec![Region {
@@ -172,6 +173,7 @@ impl CellTest {
 fn first_nodes(model: &Model, nodes: usize) -> Model {
     Model {
         position: model.position[..nodes].to_vec(),
+        volume: model.volume[..nodes].to_vec(),
         region: model.region[..nodes].to_vec(),
         surface_elevation: model.surface_elevation[..nodes].to_vec(),
         vertical_effective_stress: model.vertical_effective_stress[..STRESS_NODES * nodes].to_vec(),
@@ -317,9 +319,8 @@ impl ShearCell {
         test.validate()?;
         let (model, order, free) = test.model()?;
         let nodes = model.nodes();
-        let volume = vec![model.spacing.x * model.spacing.y; nodes];
         let walls = (&model.outline, Walls::statics(&model.outline));
-        let geometry = Geometry::build(&model, &model.position, &volume, walls, None);
+        let geometry = Geometry::build(&model, &model.position, &model.volume, walls, None);
         let reached = |j: usize| geometry.gradient.transposed.iter_row(j).map(|(s, _)| s / STRESS_NODES + 1);
         let computed =
             if test.every_stress_node { nodes } else { (0..free).flat_map(reached).max().unwrap_or(free) };
@@ -329,7 +330,7 @@ impl ShearCell {
         let point = StressPoint {
             stress,
             density: test.density,
-            volume: volume[0] / STRESS_NODES as f64,
+            volume: model.volume[0] / STRESS_NODES as f64,
             ..StressPoint::default()
         };
         let mut points = vec![point; STRESS_NODES * computed];
@@ -348,7 +349,7 @@ impl ShearCell {
                 rate: 0.0,
                 tangent: points[0].shear_modulus,
             },
-            mass: test.density * volume[0],
+            mass: test.density * model.volume[0],
             position: model.position.clone(),
             velocity: vec![Vec2::zeros(); nodes],
             shares: vec![NodalShare::default(); points.len()],

@@ -1,6 +1,7 @@
 //! Stages and stepping: the leapfrog loop, the gravity relaxation and the switch between them.
 
 use crate::{
+    balance,
     base::{Base, CompliantBase, Impedance, Vertical},
     boundary::{EdgeNodes, Outline, Walls, base_condition},
     column::ColumnRecord,
@@ -269,7 +270,8 @@ impl Simulation {
                 *force -= gradient * *volume;
             }
         }
-        (self.dt, self.criterion) = self.limit(PressureCoupling::None, RELAXATION_FACTOR);
+        let factor = if self.geometry.is_balanced { balance::RESPONSE } else { 1.0 };
+        (self.dt, self.criterion) = self.limit(PressureCoupling::None, factor * RELAXATION_FACTOR);
         self.begin(Active::Gravity { stage, kinetic_energy: 0.0, residual: f64::INFINITY, at_rest: false });
         self.set_guests(0);
         self.velocity.fill(Vec2::zeros());
@@ -1365,6 +1367,7 @@ pub(crate) fn sorted(model: &Model) -> (Model, Vec<usize>) {
     });
     let sorted = Model {
         position: order.iter().map(|&i| model.position[i]).collect(),
+        volume: order.iter().map(|&i| model.volume[i]).collect(),
         region: order.iter().map(|&i| model.region[i]).collect(),
         surface_elevation: order.iter().map(|&i| model.surface_elevation[i]).collect(),
         vertical_effective_stress: order

@@ -268,6 +268,7 @@ pub(crate) mod tests {
         let nodes = position.len();
         Model {
             spacing: Vec2::repeat(1.0),
+            volume: vec![1.0; nodes],
             region: vec![0; nodes],
             regions: vec![Region {
                 soil: Soil::Elastic(Elastic::new(1.0, 2.0).unwrap()),

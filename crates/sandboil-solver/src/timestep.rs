@@ -77,7 +77,7 @@ pub enum PressureCoupling {
 /// Members of a stencil inside the undeformed lattice, at a place seen from one of its nodes, m.
 pub fn lattice(model: &Model, at: Vec2) -> Vec<Member> {
     let support = WendlandQuintic::new(model.smoothing_length()).support();
-    let volume = model.spacing.x * model.spacing.y;
+    let volume = model.cell();
     let reach = |spacing: f64, at: f64| ((support + at.abs()) / spacing).ceil();
     let (columns, rows) = (reach(model.spacing.x, at.x), reach(model.spacing.y, at.y));
     let span = |count: f64| (0..).map(move |k| f64::from(k) - count).take_while(move |k| *k <= count);

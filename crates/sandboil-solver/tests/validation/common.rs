@@ -34,6 +34,7 @@ pub fn column(height: f64, spacing: f64, columns: usize, region: Region, water: 
     let effective = |x: Vec2| (bulk - unit_weight) * (height - x.y);
     Model {
         spacing: Vec2::repeat(spacing),
+        volume: vec![spacing * spacing; position.len()],
         region: vec![0; position.len()],
         surface_elevation: vec![height; position.len()],
         vertical_effective_stress: position

@@ -137,17 +137,19 @@ fn on_inclined_base(angle: f64, spacing: f64, width: f64) -> Model {
     let slope = angle.to_radians().tan();
     let columns = (width / spacing).round() as usize;
     let mut model = weightless(block(HEIGHT, spacing, columns, elastic(SHEAR_MODULUS, BULK_MODULUS), None));
-    // As scenes do, nodes closer to the base than a quarter of the spacing are left out.
-    let keep: Vec<usize> = (0..model.nodes())
-        .filter(|&k| {
-            let x = model.position[k];
-            slope == 0.0 || (x.y - slope * x.x) * slope.atan().cos() > 0.25 * spacing
-        })
-        .collect();
-    model.position = keep.iter().map(|&k| model.position[k]).collect();
-    model.region = vec![0; keep.len()];
-    model.surface_elevation = vec![HEIGHT; keep.len()];
-    model.vertical_effective_stress = vec![0.0; 2 * keep.len()];
+    // As in scenes, the lowest cell of a column reaches down to the base and its node stands in its middle.
+    model.position.retain(|x| x.y > slope * x.x);
+    model.volume = vec![spacing * spacing; model.nodes()];
+    for (x, volume) in model.position.iter_mut().zip(&mut model.volume) {
+        let height = x.y + 0.5 * spacing - slope * x.x;
+        if height < 1.5 * spacing {
+            x.y = slope * x.x + 0.5 * height;
+            *volume = spacing * height;
+        }
+    }
+    model.region = vec![0; model.nodes()];
+    model.surface_elevation = vec![HEIGHT; model.nodes()];
+    model.vertical_effective_stress = vec![0.0; 2 * model.nodes()];
     model.outline.base = vec![Vec2::zeros(), Vec2::new(width, slope * width)];
     if let [_, Some(right)] = &mut model.outline.sides {
         right.extent[0] = slope * width;

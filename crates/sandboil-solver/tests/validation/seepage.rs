@@ -24,6 +24,7 @@ fn rectangle(
     let side = |x: f64| Some(Side { x, extent: [0.0, height], support: Support::FreeSlip });
     Model {
         spacing: Vec2::repeat(spacing),
+        volume: vec![spacing * spacing; position.len()],
         region: position.iter().map(|&x| region_of(x)).collect(),
         surface_elevation: vec![height; position.len()],
         vertical_effective_stress: vec![0.0; 2 * position.len()],
