@@ -396,26 +396,24 @@ impl EdgeNodes {
     pub fn new(model: &Model) -> Self {
         let (spacing, outline) = (model.spacing, &model.outline);
         let first = model.position.iter().fold(Vec2::repeat(f64::INFINITY), |low, x| low.inf(x));
-        let place = |x: f64, first: f64, spacing: f64| {
+        let place = |x: f64| {
             #[allow(clippy::cast_possible_truncation)] // far fewer cells than 2^63
-            let cell = ((x - first) / spacing).round() as i64;
+            let cell = ((x - first.x) / spacing.x).round() as i64;
             cell
         };
         let mut columns: BTreeMap<i64, usize> = BTreeMap::new();
-        let mut rows: [BTreeMap<i64, usize>; 2] = Default::default();
+        let mut sides: [Vec<usize>; 2] = Default::default();
         for (node, at) in model.position.iter().enumerate() {
-            let column = columns.entry(place(at.x, first.x, spacing.x)).or_insert(node);
+            let column = columns.entry(place(at.x)).or_insert(node);
             if at.y < model.position[*column].y {
                 *column = node;
             }
-            for (rows, side) in rows.iter_mut().zip(outline.sides) {
+            for (nodes, side) in sides.iter_mut().zip(outline.sides) {
                 let Some(side) = side else { continue };
+                // The outermost column alone: the next one stands a spacing and a half away.
                 let near = (at.x - side.x).abs() < spacing.x;
                 if near && (side.extent[0]..=side.extent[1]).contains(&at.y) {
-                    let row = rows.entry(place(at.y, first.y, spacing.y)).or_insert(node);
-                    if (at.x - side.x).abs() < (model.position[*row].x - side.x).abs() {
-                        *row = node;
-                    }
+                    nodes.push(node);
                 }
             }
         }
@@ -424,7 +422,10 @@ impl EdgeNodes {
             at.y - outline.base_elevation(at.x) < FARTHEST_FROM_BASE * spacing.y
         };
         let base = columns.into_values().filter(near_base).collect();
-        Self { base, sides: rows.map(|rows| rows.into_values().collect()) }
+        for nodes in &mut sides {
+            nodes.sort_by(|&a, &b| model.position[a].y.total_cmp(&model.position[b].y));
+        }
+        Self { base, sides }
     }
 
     /// Points of the base below its nodes, m.
@@ -442,5 +443,26 @@ pub fn base_condition(operators: Operators, absorbs_vertically: bool) -> Conditi
         (Operators::Conservative, false) => Condition::VerticalRoller,
         // Free slip, with the odd shear stress of the images (Section 4.2).
         (Operators::Printed, false) => Condition::FreeSlip,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::skeleton::tests::square_block;
+
+    /// Above a base that is not level the lowest nodes stand up to a quarter of a row off the lattice.
+    #[test]
+    fn no_row_along_a_side_is_lost_above_an_uneven_base() {
+        const SIDE: usize = 5;
+        let mut model = square_block(SIDE);
+        for (x, shift) in model.position[..SIDE].iter_mut().zip([0.25, -0.25, 0.1, 0.0, -0.2]) {
+            x.y += shift;
+        }
+        let side = |x: f64| Some(Side { x, extent: [-1.0, 9.0], support: Support::FreeSlip });
+        model.outline.sides = [side(-0.5), side(SIDE as f64 - 0.5)];
+        let edges = EdgeNodes::new(&model);
+        let column = |first: usize| (0..SIDE).map(|row| first + SIDE * row).collect::<Vec<_>>();
+        assert_eq!(edges.sides, [column(0), column(SIDE - 1)]);
     }
 }
