@@ -155,6 +155,7 @@ pub fn small_strain_moduli(material: &Bound<'_, PyDict>, stress: [f64; 4]) -> Py
 
 /// Degree of saturation at pressure heads (m) by a retention curve `(alpha, n, residual, full)`.
 #[pyfunction]
+#[allow(clippy::needless_pass_by_value)] // arguments come from Python by value
 pub fn saturation<'py>(
     py: Python<'py>,
     curve: (f64, f64, f64, f64),

@@ -40,6 +40,7 @@ pub struct Seepage {
 impl Seepage {
     /// Starts from pore pressures (kPa); without a duration (s) it looks for the steady state.
     #[new]
+    #[allow(clippy::needless_pass_by_value)] // arguments come from Python by value
     #[pyo3(signature = (description, pore_pressure, conditions, duration))]
     fn new(
         description: &Bound<'_, PyDict>,
