@@ -566,6 +566,30 @@ class Run:
         return written_fields(self.scene)
 
     @property
+    def discharge(self) -> list[tuple[str, float]]:
+        """Kind of each seepage condition and inflow through it at the end of the seepage stage, m3/s per m.
+
+        Empty without one.
+        """
+        if self.scene.seepage is None:
+            return []
+        with self._open() as file:
+            flows = file["seepage/discharge"][:].tolist()
+        kinds = [condition.kind for condition in self.scene.seepage.conditions]
+        return list(zip(kinds, flows, strict=True))
+
+    @property
+    def water_balance(self) -> tuple[list[float], float] | None:
+        """Inflow through each seepage condition, and increase of the stored water, m3 per m.
+
+        None without a seepage stage of some duration: a steady state stores nothing.
+        """
+        if self.scene.seepage is None or self.scene.seepage.duration is None:
+            return None
+        with self._open() as file:
+            return file["seepage/inflow"][:].tolist(), float(file["seepage"].attrs["stored_m3_per_m"])
+
+    @property
     def times(self) -> Floats:
         """(frames,) times of the fields of the last stage begun, s."""
         return self.frame_times()
