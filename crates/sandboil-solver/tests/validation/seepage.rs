@@ -319,3 +319,52 @@ fn columns_that_wet_and_drain() {
         assert!(lost < 1e-6 && front.abs() < 1.0);
     }
 }
+
+/// The ends of what can be asked: each ends with its water accounted for and heads between those that drive it.
+#[test]
+fn ends_of_the_range() {
+    let clay = VanGenuchten::new(0.8, 1.09, 0.2, 1.0).unwrap();
+    let sand = VanGenuchten::new(14.5, 2.68, 0.1, 1.0).unwrap();
+    // Name, curve, conductivity, porosity, factor on the water's stiffness, duration in seconds.
+    let day = 86_400.0;
+    for (name, curve, k, porosity, softness, duration) in [
+        ("k 1e-12 m/s", sand, 1e-12, 0.4, 1.0, 1e4 * day),
+        ("k 1 m/s", sand, 1.0, 0.4, 1.0, 60.0),
+        ("clay", clay, 1e-9, 0.4, 1.0, 100.0 * day),
+        ("K_f x 0.01", sand, 1e-5, 0.4, 0.01, day),
+        ("K_f x 100", sand, 1e-5, 0.4, 100.0, day),
+        ("porosity 0.05", sand, 1e-5, 0.05, 1.0, day),
+        ("porosity 0.95", sand, 1e-5, 0.95, 1.0, day),
+    ] {
+        let mut region = soil(Conductivity::isotropic(k));
+        (region.retention, region.porosity) = (Some(curve), porosity);
+        let mut model = rectangle([6.0, 4.0], 0.5, vec![region], |_| 0);
+        model.water = Some(Water { bulk_modulus: softness * WATER.bulk_modulus, ..WATER });
+        let level = |value: f64| HydraulicCondition::Reservoir(Series::constant(value));
+        // Full at first, then suddenly drawn down on one side; rain on dry ground.
+        let drawn =
+            vec![on(&[[0.0, 0.0], [0.0, 4.0]], level(0.5)), on(&[[6.0, 0.0], [6.0, 4.0]], level(4.0))];
+        let storm = HydraulicCondition::Rain(Series::constant(1e-5));
+        let rained = vec![
+            on(&[[0.0, 4.0], [6.0, 4.0]], storm),
+            on(&[[0.0, 0.0], [6.0, 0.0]], HydraulicCondition::SeepageFace),
+        ];
+        let full = model.position.iter().map(|x| 10.0 * (4.0 - x.y)).collect();
+        let dry = vec![-1e4; model.nodes()];
+        for (what, pressure, boundaries) in [("drawdown", full, drawn), ("rain on dry ground", dry, rained)] {
+            let mut seepage = Seepage::new(&model, &pressure, boundaries).unwrap();
+            assert!(seepage.advance(Until::Time(duration), |_| true).unwrap());
+            let balance = seepage.balance();
+            let inflow: f64 = balance.inflow.iter().sum();
+            let moved: f64 = balance.inflow.iter().map(|q| q.abs()).sum();
+            let heads = seepage.head();
+            let (low, high) = heads.iter().fold((f64::MAX, f64::MIN), |(a, b), h| (a.min(*h), b.max(*h)));
+            let lost = (balance.stored - inflow).abs() / moved.max(1e-12);
+            println!(
+                "{name}, {what}: heads {low:.2} to {high:.2} m, lost {lost:.1e}, {:?}",
+                seepage.counters()
+            );
+            assert!(lost < 1e-6 && low > -1001.0 && high < 4.0 + 0.01);
+        }
+    }
+}
