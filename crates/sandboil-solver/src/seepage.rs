@@ -21,6 +21,8 @@ use sandboil_sph::Vec2;
 const HEAD_TOLERANCE: f64 = 1e-6;
 /// Iterations, inner or outer, after which a step is tried anew, shorter.
 const MOST_ITERATIONS: u32 = 50;
+/// Iterations along the retention curve itself after which a step is solved by the nested ones.
+const DIRECT_ITERATIONS: u32 = 12;
 /// Change of the degree of saturation anywhere that a transient step aims at: conductivities lag by one step.
 const SATURATION_CHANGE: f64 = 0.05;
 /// Change over the aim beyond which a step is taken back.
@@ -128,6 +130,15 @@ struct Following {
     /// Last change of each.
     change: Vec<f64>,
     arrived: bool,
+}
+
+/// The state at the beginning of a step, s long, and its end, s.
+struct Begun {
+    head: Vec<f64>,
+    moisture: Vec<Moisture>,
+    relative: Vec<f64>,
+    dt: f64,
+    end: f64,
 }
 
 /// A linear system of one iteration: inflow of node `i` is `sum_j a_ij H_j + constant_i`, m2/s.
@@ -423,60 +434,81 @@ impl Seepage {
     /// iterations find its solution from anywhere (Casulli and Zanolli 2010, SIAM J. Sci. Comput. 32): the retention
     /// curve is the difference of two curves that steepen as they rise, of which the outer iteration follows one and the
     /// inner the other.
+    /// A step from which little changes follows the retention curve itself, and needs no nesting.
     fn solve(&mut self, dt: f64, end: f64) -> bool {
-        let (start, wet) = (self.head.clone(), self.moisture.clone());
-        let relative: Vec<f64> = wet.iter().map(|moisture| moisture.relative_conductivity).collect();
+        let begun = Begun {
+            head: self.head.clone(),
+            relative: self.moisture.iter().map(|moisture| moisture.relative_conductivity).collect(),
+            moisture: self.moisture.clone(),
+            dt,
+            end,
+        };
+        let holds = self.holds.clone();
         let mut switches = vec![0_u32; self.holds.len()];
-        // The first outer iterate is where only the inner curve bends.
-        for ((head, at), retention) in self.head.iter_mut().zip(&self.position).zip(&self.retention) {
-            if let Some(curve) = retention {
-                *head = head.min(at.y + curve.steepest());
+        let mut solved = self.newton(&begun, None, &mut switches, DIRECT_ITERATIONS);
+        if !solved {
+            self.holds = holds;
+            switches.fill(0);
+            // The first outer iterate is where only the inner curve bends.
+            for ((k, head), at) in self.head.iter_mut().enumerate().zip(&self.position) {
+                *head = begun.head[k]
+                    .min(self.retention[k].map_or(f64::INFINITY, |curve| at.y + curve.steepest()));
             }
-        }
-        for _ in 0..MOST_ITERATIONS {
-            let outer = self.head.clone();
-            let mut settled = false;
             for _ in 0..MOST_ITERATIONS {
-                let switched = self.switch_cells(end, &relative, &mut switches);
-                let mut inflow = self.inflow(end, &relative);
-                let along = self.flow_along(&relative, &self.head);
-                let (mut storage, mut largest) = (vec![0.0; self.head.len()], 0.0_f64);
-                for (i, storage) in storage.iter_mut().enumerate() {
-                    let pores = self.volume[i] * self.porosity[i];
-                    let own = self.head[i];
-                    // Content and slope at the present heads, the outer curve along its tangent.
-                    let (content, slope) = self.content(i, own, outer[i]);
-                    let squeezed = self.compressibility(i, &wet[i]);
-                    let gained = pores * (content - wet[i].saturation) + squeezed * (own - start[i]);
-                    let into: f64 = along[i]
-                        + inflow.rows[i].iter().map(|&(j, a)| a * self.head[j as usize]).sum::<f64>();
-                    inflow.constant[i] += into - gained / dt;
-                    *storage = (pores * slope + squeezed) / dt;
-                    largest = largest.max((inflow.constant[i] * dt / pores).abs());
-                }
-                if !largest.is_finite() {
+                let outer = self.head.clone();
+                if !self.newton(&begun, Some(&outer), &mut switches, MOST_ITERATIONS) {
                     return false;
                 }
-                self.counters.iterations += 1;
-                let solved =
-                    self.solve_linear(inflow.rows, &relative, &storage, &inflow.constant, STEP_TOLERANCE);
-                let Some(change) = solved else { return false };
-                for (head, change) in self.head.iter_mut().zip(&change) {
-                    *head += change;
-                }
-                let moved = change.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
-                if moved < HEAD_TOLERANCE * self.spacing && !switched {
-                    settled = true;
+                let moved =
+                    self.head.iter().zip(&outer).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+                if moved < HEAD_TOLERANCE * self.spacing {
+                    solved = true;
                     break;
                 }
             }
-            if !settled {
+        }
+        if solved {
+            self.inflow(end, &begun.relative);
+            self.moisture = self.moisture_at(&self.head.clone());
+        }
+        solved
+    }
+
+    /// Newton's iteration for the heads at the end of a step, along the outer curve's tangent at `outer`, or along the
+    /// retention curve itself. Returns whether it settled.
+    fn newton(&mut self, begun: &Begun, outer: Option<&[f64]>, switches: &mut [u32], most: u32) -> bool {
+        let Begun { head: start, moisture: wet, relative, dt, end } = begun;
+        for _ in 0..most {
+            let switched = self.switch_cells(*end, relative, switches);
+            let mut inflow = self.inflow(*end, relative);
+            let along = self.flow_along(relative, &self.head);
+            let (mut storage, mut largest) = (vec![0.0; self.head.len()], 0.0_f64);
+            for (i, storage) in storage.iter_mut().enumerate() {
+                let pores = self.volume[i] * self.porosity[i];
+                let own = self.head[i];
+                let (content, slope) = self.content(i, own, outer.map_or(own, |outer| outer[i]));
+                let squeezed = self.compressibility(i, &wet[i]);
+                let gained = pores * (content - wet[i].saturation) + squeezed * (own - start[i]);
+                let row = inflow.rows[i].iter();
+                let into = along[i] + row.map(|&(j, a)| a * self.head[j as usize]).sum::<f64>();
+                inflow.constant[i] += into - gained / dt;
+                *storage = (pores * slope + squeezed) / dt;
+                largest = largest.max((inflow.constant[i] * dt / pores).abs());
+            }
+            if !largest.is_finite() {
                 return false;
             }
-            let moved = self.head.iter().zip(&outer).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-            if moved < HEAD_TOLERANCE * self.spacing {
-                self.inflow(end, &relative);
-                self.moisture = self.moisture_at(&self.head.clone());
+            self.counters.iterations += 1;
+            let left = &inflow.constant;
+            let Some(change) = self.solve_linear(inflow.rows, relative, &storage, left, STEP_TOLERANCE)
+            else {
+                return false;
+            };
+            for (head, change) in self.head.iter_mut().zip(&change) {
+                *head += change;
+            }
+            let moved = change.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
+            if moved < HEAD_TOLERANCE * self.spacing && !switched {
                 return true;
             }
         }
@@ -487,6 +519,11 @@ impl Seepage {
     /// and the slope, 1/m.
     fn content(&mut self, i: usize, head: f64, outer: f64) -> (f64, f64) {
         let Some(curve) = self.retention[i] else { return (1.0, 0.0) };
+        if head == outer {
+            self.counters.retention_calls += 1;
+            let Moisture { saturation, capacity, .. } = curve.at(head - self.position[i].y);
+            return (saturation, capacity);
+        }
         self.counters.retention_calls += 2;
         let steepest = curve.steepest();
         let peak = curve.at(steepest);
