@@ -18,6 +18,7 @@ import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 import sandboil as sb
+from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
@@ -174,13 +175,23 @@ def dam(geometry: dict[str, Any], spacing: float, conditions: list[Any], duratio
     )
 
 
+def triangles(simulation: sb.Simulation) -> Triangulation:
+    """The nodes joined to those beside them: not across the air over a slope."""
+    x, y = simulation.particles.position.T
+    joined = Triangulation(x, y)
+    corners = simulation.particles.position[joined.triangles]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    joined.set_mask(longest > 2.5 * max(simulation.particles.spacing))
+    return joined
+
+
 def draw_dam(geometry: dict[str, Any]) -> None:
     """Steady seepage through the Lower San Fernando Dam, and its water on the way of a rising reservoir."""
     drain = sb.Drain(
         [(98.2, 306.4), (86.8, 311.0), (77.0, 315.0), (69.7, 318.0), (62.4, 321.0), (40.0, 330.1)]
     )
     tail = sb.Reservoir("surface", level=305.0, x=(0.0, 280.0))
-    figure, axes = plt.subplots(2, 1, figsize=(12, 7), constrained_layout=True)
+    figure, axes = plt.subplots(2, 1, figsize=(12, 5), constrained_layout=True)
     steady = dam(geometry, 0.8, [sb.Reservoir("surface", level=338.0, x=(-220.0, 0.0)), tail, drain], None)
     simulation = sb.Simulation(steady)
     start = time.perf_counter()
@@ -192,11 +203,11 @@ def draw_dam(geometry: dict[str, Any]) -> None:
         f"steady, 0.8 m, {len(simulation.particles.position)} nodes: {spent:.0f} s, {simulation.counters()}"
     )
     print(f"inflow {flows[0]:.3e} m2/s, downstream {flows[1]:.3e}, drain {flows[2]:.3e}, net {net:.1e}")
-    x, y = simulation.particles.position.T
-    heads = axes[0].tricontourf(x, y, simulation.field("head"), levels=np.arange(304.0, 340.0, 2.0))
+    joined = triangles(simulation)
+    heads = axes[0].tricontourf(joined, simulation.field("head"), levels=np.arange(304.0, 340.0, 2.0))
     figure.colorbar(heads, ax=axes[0], label="total head, m")
-    axes[0].tricontour(x, y, simulation.field("pore_pressure"), levels=[0.0], colors="red")
-    axes[0].plot(*np.transpose(drain.points), "w--", label="chimney drain")
+    axes[0].tricontour(joined, simulation.field("pore_pressure"), levels=[0.0], colors="red")
+    axes[0].plot(*np.transpose(drain.points), "m--", label="chimney drain")
     axes[0].set_title(
         f"steady state: inflow {flows[0]:.2e} m²/s, downstream {-flows[1]:.2e}, drain {-flows[2]:.2e}",
         fontsize=9,
@@ -209,12 +220,9 @@ def draw_dam(geometry: dict[str, Any]) -> None:
     for k, months in enumerate((6, 12, 18, 24, 36)):
         while not simulation.advance(months / 12.0 * year, 60.0):
             pass
-        x, y = simulation.particles.position.T
-        lines = axes[1].tricontour(
-            x, y, simulation.field("pore_pressure"), levels=[0.0], colors=[f"C{k}"], linewidths=1.2
-        )
+        pressure = simulation.field("pore_pressure")
+        axes[1].tricontour(triangles(simulation), pressure, levels=[0.0], colors=[f"C{k}"], linewidths=1.2)
         axes[1].plot([], [], f"C{k}", label=f"{months} months")
-        del lines
     balance = simulation.water_balance
     assert balance is not None
     lost = abs(sum(balance[0]) - balance[1]) / max(abs(flow) for flow in balance[0])
