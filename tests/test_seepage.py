@@ -88,7 +88,7 @@ def test_driven_in_steps_or_at_once_is_the_same() -> None:
         sb.Flux("surface", inflow=-1e-8, x=(2.0, 4.0)),
         sb.Rain("surface", rate=[(0.0, 0.0), (3600.0, 1e-6)]),
         sb.Reservoir("left", level=8.0),
-        sb.SeepageFace("right"),
+        sb.SeepageFace("surface"),
         sb.Drain([(4.0, 1.0), (6.0, 1.0)]),
     ],
 )
@@ -215,7 +215,7 @@ REFUSED: dict[str, tuple[Callable[[], object], str, str]] = {
     "no soil that lets water through": (
         lambda: dam(**without("hydraulic_conductivity")),
         "scene.regions",
-        "must hold one with hydraulic_conductivity",
+        "must hold one that water flows through",
     ),
     "fluxes alone on the way to a steady state": (
         lambda: dam([sb.Flux("left", inflow=1e-6), sb.Flux("right", inflow=-1e-6)]),
@@ -224,7 +224,7 @@ REFUSED: dict[str, tuple[Callable[[], object], str, str]] = {
     ),
     "change on the way to a steady state": (
         lambda: dam([sb.Reservoir("left", level=[(0, 8), (9, 2)])]),
-        "scene.stages[0].conditions[0]",
+        "scene.stages[0].conditions[0].level",
         "must not change with time",
     ),
     "seepage without water": (

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from math import cos, radians, sin
+from math import cos, dist, radians, sin
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
 from ._errors import InvalidInput
 from ._model import Many, Model, Number, as_float
-from .boundaries import Point
+from .boundaries import COORDINATE_TOLERANCE, Point
 from .materials import NonNegative, Positive
 
 Edge = Literal["surface", "base", "left", "right"]
@@ -215,6 +216,10 @@ class Rain(_Condition):
 
     @model_validator(mode="after")
     def _falls(self) -> Rain:
+        if isinstance(self.on, str) and self.on != "surface":
+            raise InvalidInput(
+                "condition.on", self.on, "must be the 'surface' or points along it", "Flux takes any edge"
+            )
         for i, (_, rate) in enumerate(self.rate):
             if rate < 0.0:
                 raise InvalidInput(
@@ -253,6 +258,19 @@ class Drain(Model):
     kind: Literal["drain"] = "drain"
     points: Many[Point] = Field(min_length=2, description="(x, y) along the drain, m")
 
+    if TYPE_CHECKING:
+
+        def __init__(self, points: Sequence[tuple[float, float]]) -> None: ...
+
+    @model_validator(mode="after")
+    def _has_length(self) -> Drain:
+        for i, (before, after) in enumerate(itertools.pairwise(self.points)):
+            if dist(before, after) <= COORDINATE_TOLERANCE:
+                raise InvalidInput(
+                    f"condition.points[{i + 1}]", after, "must lie apart from the point before it"
+                )
+        return self
+
 
 Condition = Annotated[
     Head | Pressure | Flux | Rain | Reservoir | SeepageFace | Drain, Field(discriminator="kind")
@@ -271,13 +289,29 @@ def heads_of(condition: Model) -> tuple[str, Series] | None:
     return None
 
 
+# What conditions prescribe, and its unit.
+_PRESCRIBED = {"head": "m", "pressure": "kPa", "inflow": "m/s", "rate": "m/s", "level": "m"}
+
+
+def prescribed(condition: Model) -> str | None:
+    """Name of what a condition prescribes; None if it has no value."""
+    return next((name for name in _PRESCRIBED if name in type(condition).model_fields), None)
+
+
 def series_of(condition: Model) -> Series:
     """Values of a condition over time; empty if it has none."""
-    for name in ("head", "pressure", "inflow", "rate", "level"):
-        if name in type(condition).model_fields:
-            values: Series = getattr(condition, name)
-            return values
-    return ()
+    name = prescribed(condition)
+    values: Series = () if name is None else getattr(condition, name)
+    return values
+
+
+def described(condition: Any, time: float) -> str:
+    """Kind of a condition and what it prescribes at a time (s), for people."""
+    name = prescribed(condition)
+    if name is None:
+        return str(condition.kind)
+    moments, values = zip(*series_of(condition), strict=True)
+    return f"{condition.kind}, {name} {np.interp(time, moments, values):.4g} {_PRESCRIBED[name]}"
 
 
 class Seepage(Model):
@@ -304,4 +338,9 @@ class Seepage(Model):
         ) -> None: ...
 
 
-AnyConductivity = NonNegative | Conductivity
+def _tensor(value: object) -> object:
+    """A table as the conductivity that it tells, which refuses its own values."""
+    return Conductivity(**value) if isinstance(value, dict) else value
+
+
+AnyConductivity = Annotated[NonNegative | Conductivity, BeforeValidator(_tensor)]

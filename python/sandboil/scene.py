@@ -36,10 +36,12 @@ from .hydraulics import (
     AnyConductivity,
     Conductivity,
     Drain,
+    Pressure,
     Seepage,
-    Series,
+    SeepageFace,
     VanGenuchten,
     heads_of,
+    prescribed,
     series_of,
 )
 from .materials import Elastic, Material, PM4Sand, Positive
@@ -851,7 +853,10 @@ class Scene(Model):
             path = f"scene.stages[{i}]"
             if i > 0:
                 raise InvalidInput(
-                    f"{path}.kind", "seepage", "must be the first stage: the ground is at rest"
+                    f"{path}.kind",
+                    "seepage",
+                    "must be the first stage: the ground is at rest",
+                    "water that flows while the ground moves is computed by the other stages themselves",
                 )
             if self.water is None:
                 raise InvalidInput("scene.water", None, "is required by a seepage stage", "water = Water()")
@@ -859,7 +864,8 @@ class Scene(Model):
                 raise InvalidInput(
                     "scene.regions",
                     [r.name for r in self.regions],
-                    "must hold one with hydraulic_conductivity",
+                    "must hold one that water flows through",
+                    "hydraulic_conductivity = 1e-5 (m/s) is a fine sand",
                 )
             if stage.duration is None and not any(c.kind in REFERENCES for c in stage.conditions):
                 raise InvalidInput(
@@ -870,13 +876,19 @@ class Scene(Model):
                 )
             for k, condition in enumerate(stage.conditions):
                 self._check_condition(stage, condition, f"{path}.conditions[{k}]")
+            self._check_shared_edges(stage, path)
             self._check_desaturation(stage, path)
 
     def _check_condition(self, stage: Seepage, condition: Any, path: str) -> None:
         line = self.condition_line(condition)
         if isinstance(condition, Drain):
             if not shapely.buffer(self.section, COORDINATE_TOLERANCE).covers(line):
-                raise InvalidInput(f"{path}.points", condition.points, "must lie in the section")
+                raise InvalidInput(
+                    f"{path}.points",
+                    condition.points,
+                    "must lie in the section",
+                    "water at its edges is told by the other conditions",
+                )
         elif line.is_empty or line.length <= COORDINATE_TOLERANCE:
             raise InvalidInput(
                 f"{path}.{'x' if condition.x else 'on'}",
@@ -885,16 +897,13 @@ class Scene(Model):
                 f"the section reaches from x = {self.bounds[0]:g} to {self.bounds[2]:g} m",
             )
         elif not isinstance(condition.on, str):
-            away = shapely.distance(shapely.points(condition.on), self.section.exterior)
-            if (away > self.spacing).any():
-                raise InvalidInput(
-                    f"{path}.on[{int(np.argmax(away))}]",
-                    condition.on[int(np.argmax(away))],
-                    f"must lie on the edge of the section, it is {away.max():.3g} m away",
-                )
-        if isinstance(self.sides, Periodic) and getattr(condition, "on", None) in ("left", "right"):
+            self._check_points(condition, f"{path}.on")
+        if isinstance(self.sides, Periodic) and not isinstance(condition, Drain) and self._on_a_side(line):
             raise InvalidInput(
-                f"{path}.on", condition.on, "does not go with periodic sides, which are no edges"
+                f"{path}.on",
+                condition.on,
+                "does not go with periodic sides, which are no edges",
+                "sides = Roller() or FreeField()",
             )
         lowest = self.outline.base[:, 1].min()
         if (told := heads_of(condition)) is not None:
@@ -908,16 +917,71 @@ class Scene(Model):
                         f"must not lie below the base, elevation {lowest:g} m",
                         "heads are elevations in the section's own coordinates",
                     )
-        last: Series = series_of(condition)
-        if stage.duration is None and len(last) > 1:
+        values = series_of(condition)
+        if stage.duration is None and len(values) > 1:
             raise InvalidInput(
-                f"{path}", last, "must not change with time on the way to a steady state", "give a duration"
+                f"{path}.{prescribed(condition)}",
+                values,
+                "must not change with time on the way to a steady state",
+                "give the stage a duration, in s",
             )
+
+    def _on_a_side(self, line: BaseGeometry) -> bool:
+        """Whether a line runs along the left or the right end of the section."""
+        x = line.bounds[0::2]
+        return any(np.allclose(x, end, atol=COORDINATE_TOLERANCE, rtol=0.0) for end in self.bounds[0::2])
+
+    def _check_points(self, condition: Any, path: str) -> None:
+        """The points of a line, and what lies between them, must be on the edge."""
+        away = shapely.distance(shapely.points(condition.on), self.section.exterior)
+        farthest = int(np.argmax(away))
+        hint = "for a line inside the section: Drain"
+        if away[farthest] > self.spacing:
+            raise InvalidInput(
+                f"{path}[{farthest}]",
+                condition.on[farthest],
+                f"must lie on the edge of the section, it is {away[farthest]:.3g} m away",
+                hint,
+            )
+        between = shapely.segmentize(shapely.LineString(condition.on), self.spacing)
+        away = shapely.distance(shapely.points(between.coords), self.section.exterior)
+        if away.max() > self.spacing:
+            raise InvalidInput(
+                path,
+                condition.on,
+                f"must follow the edge of the section, it leaves it by {away.max():.3g} m",
+                hint,
+            )
+
+    def _check_shared_edges(self, stage: Seepage, path: str) -> None:
+        """No stretch of edge may obey two conditions."""
+        edges = [(k, c) for k, c in enumerate(stage.conditions) if not isinstance(c, Drain)]
+        for (k, one), (m, other) in itertools.combinations(edges, 2):
+            reach = shapely.buffer(self.condition_line(one), COORDINATE_TOLERANCE)
+            common = self.condition_line(other).intersection(reach)
+            # Lines that meet share the reach of their ends.
+            if common.length > 4.0 * COORDINATE_TOLERANCE:
+                x0, y0, x1, y1 = common.bounds
+                raise InvalidInput(
+                    f"{path}.conditions[{m}].on",
+                    other.on,
+                    f"must leave out the edge of conditions[{k}], but they share x {x0:g} to {x1:g}, "
+                    f"y {y0:g} to {y1:g}",
+                    "cut it by x = (left, right) or by points",
+                )
+
+    def _lowest_head(self, condition: Any) -> float:
+        """The lowest head that a condition may draw the water down to, m; infinite if it tells none."""
+        if (told := heads_of(condition)) is not None:
+            return min(value for _, value in told[1])
+        bottom = float(self.condition_line(condition).bounds[1])
+        if isinstance(condition, Pressure) and self.water is not None:
+            return bottom + min(value for _, value in condition.pressure) / self.water.unit_weight
+        return bottom if isinstance(condition, SeepageFace | Drain) else float("inf")
 
     def _check_desaturation(self, stage: Seepage, path: str) -> None:
         """Soil that heads leave above them must say what it holds."""
-        told = [told for condition in stage.conditions if (told := heads_of(condition)) is not None]
-        levels = [value for _, values in told for _, value in values]
+        levels = [self._lowest_head(condition) for condition in stage.conditions]
         level = min([*levels, float(self.water_level_at(np.array(self.bounds[0::2])).min())])
         for i, region in enumerate(self.regions):
             if region.retention is None and region.geometry.bounds[3] > level + self.spacing:
