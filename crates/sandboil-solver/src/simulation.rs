@@ -264,7 +264,13 @@ impl Simulation {
         let gravity = Vec2::new(0.0, -self.model.gravity);
         self.constant_force = self.mass.iter().map(|mass| gravity * *mass).collect();
         if self.model.water.is_some() {
-            let (volume, pressure) = (self.phases.volume(), self.model.neutral_stress());
+            let (suction, pressure): (Vec<f64>, Vec<f64>) =
+                self.model.neutral_stress().into_iter().map(|p| (p.min(0.0), p.max(0.0))).unzip();
+            if suction.iter().any(|p| *p < 0.0) {
+                let pull = self.suction_force(&suction);
+                self.constant_force.iter_mut().zip(pull).for_each(|(force, pull)| *force += pull);
+            }
+            let volume = self.phases.volume();
             let gradient = consistent_gradient(&self.model, &self.position, volume, &pressure);
             for ((force, gradient), volume) in self.constant_force.iter_mut().zip(gradient).zip(volume) {
                 *force -= gradient * *volume;
@@ -399,6 +405,24 @@ impl Simulation {
             self.store_reaction();
         }
         Ok(())
+    }
+
+    /// Force of suction (kPa, negative) on every node, kN/m. Water under pressure goes on as a pond beyond the ground
+    /// surface, so that its gradient is all its force; suction ends there, and draws the surface to the ground: it acts
+    /// as the stress that it is a part of, which no traction meets at the surface.
+    fn suction_force(&mut self, suction: &[f64]) -> Vec<Vec2> {
+        let places = stress_node_positions(&self.position, self.model.spacing);
+        let weights = point_weights(&self.model, &self.position, &places);
+        let kept: Vec<Stress> = self.points.iter().map(|point| point.stress).collect();
+        for (s, point) in self.points.iter_mut().enumerate() {
+            let pull = -weights.iter_row(s).map(|(node, w)| w * suction[node]).sum::<f64>();
+            point.stress = Stress { xx: pull, yy: pull, zz: pull, xy: 0.0 };
+        }
+        let force = self.static_force();
+        for (point, stress) in self.points.iter_mut().zip(kept) {
+            point.stress = stress;
+        }
+        force
     }
 
     /// Makes the present state one of rest: the constant forces balance whatever stress and pressure leave over.
