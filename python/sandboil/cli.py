@@ -122,7 +122,7 @@ def plot(
     out: Annotated[Path | None, typer.Option(help="Folder for the pictures, default plots in DIR.")] = None,
     stage: Annotated[str | None, typer.Option(help="A shaking stage, default the last.")] = None,
 ) -> None:
-    """Draw the surface's motion, pore pressure, the column and stress paths of a run as PNG."""
+    """Draw a run as PNG: seepage, the surface's motion, pore pressure, the column and stress paths."""
     # Drawing takes a second to load and no other command draws.
     from .plots import Reference
     from .plots import plot as draw

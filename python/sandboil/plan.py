@@ -36,8 +36,8 @@ class StagePlan:
     Attributes
     ----------
     name : of the stage
-    duration : s; None for gravity, which ends at rest
-    dt, dt_limit : time step at the beginning, s, and what limits it
+    duration : s; None for gravity, which ends at rest, and for seepage to its steady state
+    dt, dt_limit : time step at the beginning, s, and what limits it; 0 where no time passes
     undamped_dt : time step without the stage's Rayleigh damping, s; None if it has none
     steps : expected; None where they cannot be told before
     step_time : wall time of a step in the trial, s
@@ -130,11 +130,15 @@ class Plan:
 
 
 def _stage_lines(stage: StagePlan) -> list[str]:
-    told = f"{stage.duration:g} s" if stage.duration is not None else "to rest"
     steps = f"{stage.steps} steps" if stage.steps is not None else "number of steps not known before"
     without = f" ({stage.undamped_dt:.3g} s without Rayleigh damping)" if stage.undamped_dt else ""
+    timed = f"{steps} of {stage.dt:.3g} s, limited by the {stage.dt_limit}{without}"
+    if stage.duration is not None:
+        told = f"{stage.duration:g} s, {timed}"
+    else:
+        told = f"to rest, {timed}" if stage.dt > 0.0 else f"to its {stage.dt_limit}, {steps}"
     return [
-        f"{stage.name}: {told}, {steps} of {stage.dt:.3g} s, limited by the {stage.dt_limit}{without}",
+        f"{stage.name}: {told}",
         f"  {_duration(stage.wall_time)}, {stage.step_time * 1e3:.3g} ms a step in a trial of "
         f"{stage.trial_steps} steps",
     ]

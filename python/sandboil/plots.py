@@ -1,4 +1,4 @@
-"""Pictures of a run: what happened at the surface, to the water, over depth, and in the soil.
+"""Pictures of a run: seepage, and what happened at the surface, to the water, over depth, and in the soil.
 
 Every function gives a matplotlib figure; :func:`plot` writes them all. Another code's results in CSV may be
 laid over them; the columns are told in :class:`Reference`.
@@ -13,12 +13,17 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon as Patch
+from matplotlib.ticker import MaxNLocator
 
 from ._errors import InvalidInput
 from ._style import DPI, INPUT, OURS, REFERENCE, STYLE
 from .discretise import Floats
+from .hydraulics import described
 from .motion import Motion
 from .motion._motion import SIGNIFICANT
 from .motion._series import butterworth
@@ -26,6 +31,15 @@ from .results import PGA_CORNER, PGA_ORDER, Run, interval_of
 from .scene import Shaking
 
 FOLDER = "plots"
+
+# Colour of air and of water, and of conditions (Okabe and Ito 2008, without the phreatic line's and black).
+_WATER = LinearSegmentedColormap.from_list("water", ["#F5F0E6", "#9CCBEB"])
+_CONDITIONS = ("#0072B2", "#009E73", "#CC79A7", "#E69F00", "#F0E442")
+# Lines of equal head at most.
+_HEAD_LINES = 12
+# Points of a picture's lattice per spacing, and nodes that each is read from: those of the cells around it.
+_RASTER = 3
+_NEIGHBOURS = 12
 
 _COLUMN_TIMES = 6
 # Width of the sway over the height of the column in its picture, before the factor is rounded.
@@ -88,18 +102,12 @@ def plot(
 
     Raises
     ------
-    InvalidInput : a run without shaking, a folder that cannot be written
+    InvalidInput : a run without shaking and without seepage, a folder that cannot be written
     """
-    stage = _shaken_stage(run, stage)
     with mpl.rc_context(STYLE):
-        figures = {"surface": surface(run, reference=reference, stage=stage)}
-        if run.scene.water is not None and run.scene.output.depths:
-            figures["pore_pressure"] = pore_pressure(run, reference=reference, stage=stage)
-        figures["column"] = column(run, stage=stage)
-        if not run.scene.outline.is_level:
-            figures["section"] = section(run, stage=stage)
-        if run.scene.output.stress_paths and run.scene.output.depths:
-            figures["stress_paths"] = stress_paths(run, reference=reference, stage=stage)
+        figures = {"seepage": seepage(run)} if run.discharge else {}
+        if _shaken_stages(run) or stage is not None or not figures:
+            figures |= _shaking_figures(run, reference, _shaken_stage(run, stage))
         target = run.path.parent / FOLDER if folder is None else Path(folder)
         paths = []
         try:
@@ -112,13 +120,31 @@ def plot(
     return paths
 
 
-def _shaken_stage(run: Run, stage: str | None) -> str:
-    """The stage asked for, or the last, if it is a shaking one with histories."""
-    shaken = [
+def _shaking_figures(run: Run, reference: Reference | None, stage: str) -> dict[str, Figure]:
+    """Every picture of a shaking stage that the run has data for."""
+    figures = {"surface": surface(run, reference=reference, stage=stage)}
+    if run.scene.water is not None and run.scene.output.depths:
+        figures["pore_pressure"] = pore_pressure(run, reference=reference, stage=stage)
+    figures["column"] = column(run, stage=stage)
+    if not run.scene.outline.is_level:
+        figures["section"] = section(run, stage=stage)
+    if run.scene.output.stress_paths and run.scene.output.depths:
+        figures["stress_paths"] = stress_paths(run, reference=reference, stage=stage)
+    return figures
+
+
+def _shaken_stages(run: Run) -> list[str]:
+    """Names of the shaking stages begun."""
+    return [
         name
         for name, kind in zip(run.scene.stage_names, run.scene.stages, strict=True)
         if isinstance(kind, Shaking) and name in run.stages
     ]
+
+
+def _shaken_stage(run: Run, stage: str | None) -> str:
+    """The stage asked for, or the last, if it is a shaking one with histories."""
+    shaken = _shaken_stages(run)
     if stage is None and shaken:
         return shaken[-1]
     if stage not in shaken:
@@ -126,6 +152,81 @@ def _shaken_stage(run: Run, stage: str | None) -> str:
             "stage", stage, f"must be a shaking stage of the run: {', '.join(shaken) or 'none'}"
         )
     return stage
+
+
+def seepage(run: Run) -> Figure:
+    """Where a seepage stage has brought the water: heads, phreatic line, saturation, and discharges."""
+    water, stage = run.scene.water, run.scene.seepage
+    if water is None or stage is None or not run.discharge:
+        known = ", ".join(run.stages) or "none"
+        raise InvalidInput("stage", "seepage", f"must be a stage of the run: {known}")
+    x, y, head = _raster(run, run.seepage_field("head"))
+    _, _, saturation = _raster(run, run.seepage_field("saturation"))
+    figure = Figure(figsize=_size_of(run, len(stage.conditions)), layout="constrained")
+    axes = figure.subplots()
+    edge = shapely.get_coordinates(run.scene.section.exterior)
+    section = axes.add_patch(Patch(edge, facecolor="none", edgecolor="black", lw=0.8))
+    shading = axes.pcolormesh(
+        x, y, saturation, shading="nearest", cmap=_WATER, vmin=0.0, vmax=1.0, rasterized=True
+    )
+    figure.colorbar(shading, ax=axes, label="degree of saturation", shrink=0.8, pad=0.01)
+    shading.set_clip_path(section)
+    levels = MaxNLocator(_HEAD_LINES).tick_values(float(np.nanmin(head)), float(np.nanmax(head)))
+    heads = axes.contour(x, y, head, levels=levels, colors="black", linewidths=0.5, linestyles="solid")
+    heads.set_clip_path(section)
+    axes.clabel(heads, fontsize=6, fmt="%g")
+    phreatic = axes.contour(x, y, head - y[:, None], levels=[0.0], colors=REFERENCE, linewidths=1.8)
+    phreatic.set_clip_path(section)
+    for region in run.scene.regions:
+        axes.plot(*region.geometry.exterior.xy, color="black", lw=0.3)
+    axes.plot([], [], color="black", lw=0.5, label="total head, m")
+    axes.plot([], [], color=REFERENCE, lw=1.8, label="phreatic line, p = 0")
+    time = float(run.accounts("seepage")["time_s"])
+    for i, (condition, (_, inflow)) in enumerate(zip(stage.conditions, run.discharge, strict=True)):
+        line = np.asarray(shapely.get_coordinates(run.scene.condition_line(condition)))
+        colour = _CONDITIONS[i % len(_CONDITIONS)]
+        label = f"{described(condition, time)}: {inflow:+.3g} m$^3$/s per m"
+        axes.plot(*line.T, color=colour, lw=3.0, solid_capstyle="butt", label=label)
+    axes.set(xlabel="x, m", ylabel="y, m", aspect="equal")
+    axes.grid(visible=False)
+    entering = sum(max(inflow, 0.0) for _, inflow in run.discharge)
+    when = "steady state" if stage.duration is None else f"after {time:.4g} s"
+    axes.set_title(f"seepage, {when}: {entering:.3g} m$^3$/s per m enter", loc="left", fontsize=9)
+    told = "discharges are positive where water comes in"
+    figure.legend(loc="outside lower center", ncols=2, fontsize=7, title=told, title_fontsize=7)
+    # The layout knows the room that tick labels take only once they have been drawn.
+    figure.draw_without_rendering()
+    return figure
+
+
+def _size_of(run: Run, conditions: int) -> tuple[float, float]:
+    """Width and height of a picture of the section with a legend of so many conditions, inches."""
+    x0, y0, x1, y1 = run.scene.bounds
+    width = 10.0
+    height = float(np.clip(0.85 * width * (y1 - y0) / (x1 - x0), 1.5, width))
+    return width, height + 1.3 + 0.1 * conditions
+
+
+def _raster(run: Run, values: Floats) -> tuple[Floats, Floats, Floats]:
+    """x (m,), y (n,) and values (n, m) of a field of the nodes on a fine lattice; nan outside the section.
+
+    It goes on to the edges, which no node reaches.
+    """
+    # Imported by those who need it: it costs a quarter of a second.
+    from scipy.interpolate import RBFInterpolator
+
+    x0, y0, x1, y1 = run.scene.bounds
+    step = run.scene.spacing / _RASTER
+    x, y = (np.linspace(a, b, math.ceil((b - a) / step) + 1) for a, b in ((x0, x1), (y0, y1)))
+    raster = np.full((len(y), len(x)), np.nan)
+    points = np.stack(np.meshgrid(x, y), axis=-1)
+    # Half a cell more, so that lines are cut by the edge itself.
+    reach = shapely.buffer(run.scene.section, 0.5 * run.scene.spacing)
+    inside = shapely.intersects_xy(reach, points[..., 0], points[..., 1])
+    # Without a linear part, which a single column of nodes could not tell.
+    field = RBFInterpolator(run.position, values, neighbors=_NEIGHBOURS, kernel="linear", degree=0)
+    raster[inside] = field(points[inside])
+    return x, y, raster
 
 
 def surface(run: Run, *, reference: Reference | None = None, stage: str | None = None) -> Figure:

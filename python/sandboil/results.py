@@ -10,6 +10,7 @@ Layout of `results.h5` (format version in the root attributes; every dataset has
     /envelopes/STAGE  largest values over all steps, (nodes,)
     /motions/STAGE    the motion that shook the stage
     /stages/STAGE     attributes: steps, wall time, counters
+    /seepage          of a seepage stage: its last fields, discharge and inflow of every condition
     /scene            the scene as TOML with every default written out
 """
 
@@ -40,6 +41,7 @@ from .scene import Scene
 from .simulation import (
     FIELDS,
     HISTORIES,
+    SEEPAGE_FIELDS,
     STRESS_HISTORIES,
     VECTOR_FIELDS,
     WATER_FIELDS,
@@ -230,12 +232,19 @@ class Writer:
         for name, count in simulation.counters().items():
             stage.attrs[f"count_{name}"] = count
         if simulation.stage == "seepage":
-            discharge = np.array([inflow for _, inflow in simulation.discharge])
-            _replace(self._file, "seepage/discharge", discharge, "m3/s per m")
-            if (balance := simulation.water_balance) is not None:
-                _replace(self._file, "seepage/inflow", np.array(balance[0]), "m3 per m")
-                self._file["seepage"].attrs["stored_m3_per_m"] = balance[1]
+            self._replace_seepage()
         self._file.flush()
+
+    def _replace_seepage(self) -> None:
+        """Write where the water of a seepage stage is, and what came through its conditions."""
+        simulation = self._simulation
+        for name, values in simulation.fields(list(SEEPAGE_FIELDS)).items():
+            _replace(self._file, f"seepage/{name}", values, FIELDS[name].unit)
+        discharge = np.array([inflow for _, inflow in simulation.discharge])
+        _replace(self._file, "seepage/discharge", discharge, "m3/s per m")
+        if (balance := simulation.water_balance) is not None:
+            _replace(self._file, "seepage/inflow", np.array(balance[0]), "m3 per m")
+            self._file["seepage"].attrs["stored_m3_per_m"] = balance[1]
 
     def _append_frame(self, wall_time: float) -> None:
         simulation = self._simulation
@@ -566,30 +575,6 @@ class Run:
         return written_fields(self.scene)
 
     @property
-    def discharge(self) -> list[tuple[str, float]]:
-        """Kind of each seepage condition and inflow through it at the end of the seepage stage, m3/s per m.
-
-        Empty without one.
-        """
-        if self.scene.seepage is None:
-            return []
-        with self._open() as file:
-            flows = file["seepage/discharge"][:].tolist()
-        kinds = [condition.kind for condition in self.scene.seepage.conditions]
-        return list(zip(kinds, flows, strict=True))
-
-    @property
-    def water_balance(self) -> tuple[list[float], float] | None:
-        """Inflow through each seepage condition, and increase of the stored water, m3 per m.
-
-        None without a seepage stage of some duration: a steady state stores nothing.
-        """
-        if self.scene.seepage is None or self.scene.seepage.duration is None:
-            return None
-        with self._open() as file:
-            return file["seepage/inflow"][:].tolist(), float(file["seepage"].attrs["stored_m3_per_m"])
-
-    @property
     def times(self) -> Floats:
         """(frames,) times of the fields of the last stage begun, s."""
         return self.frame_times()
@@ -703,6 +688,47 @@ class Run:
         when = float(self._frame_time[self._frame(time, self._stage(stage))])
         return Surface(time=when, x=x, y=y + self._depth[top], displacement=displacement)
 
+    # Seepage
+
+    @property
+    def discharge(self) -> list[tuple[str, float]]:
+        """Kind of each seepage condition and inflow through it at the stage's end, m3/s per m.
+
+        Negative where water leaves; empty without a seepage stage.
+        """
+        with self._open() as file:
+            if "seepage" not in file or self.scene.seepage is None:
+                return []
+            kinds = [condition.kind for condition in self.scene.seepage.conditions]
+            return list(zip(kinds, file["seepage/discharge"][:].tolist(), strict=True))
+
+    @property
+    def water_balance(self) -> tuple[list[float], float] | None:
+        """Inflow through each condition in all the seepage stage, and gain of stored water, m3 per m.
+
+        None without a seepage stage of some duration: a steady state stores nothing.
+        """
+        with self._open() as file:
+            if "seepage/inflow" not in file:
+                return None
+            seepage = file["seepage"]
+            return seepage["inflow"][:].tolist(), float(seepage.attrs["stored_m3_per_m"])
+
+    def seepage_field(self, name: str) -> Floats:
+        """ "pore_pressure" (kPa), "head" (m) or "saturation" where the seepage stage ended, (n,).
+
+        Raises :class:`InvalidInput` for another name and in a run without such a stage.
+        """
+        if name not in SEEPAGE_FIELDS:
+            raise unknown_name("seepage_field", name, list(SEEPAGE_FIELDS))
+        with self._open() as file:
+            if "seepage" not in file:
+                raise InvalidInput(
+                    "seepage_field", name, f"must be of a run with a seepage stage, not {self.stages}"
+                )
+            values: Floats = file[f"seepage/{name}"][:]
+        return values
+
     # Summing up
 
     def summary(self) -> Summary:
@@ -800,18 +826,32 @@ def _stage_figures(run: Run, stage: str) -> dict[str, Any]:
     }
     if run.scene.stage_names.index(stage) in run._frame_stage:
         dt, limits = run.time_steps(stage)
-        figures["time step, s"] = f"{dt.min():.4g} to {dt.max():.4g}"
-        figures["time step limited by"] = ", ".join(dict.fromkeys(limits))
+        if dt.max() > 0.0:
+            figures["time step, s"] = f"{dt.min():.4g} to {dt.max():.4g}"
+            figures["time step limited by"] = ", ".join(dict.fromkeys(limits))
     figures["pore pressure diffusion"] = str(accounts["flow_scheme"])
     with run._open() as file:
         shaken = f"histories/{stage}/time" in file and len(file[f"histories/{stage}/time"]) > 1
     if shaken:
         figures |= _response_figures(run, stage)
+    if stage == "seepage":
+        figures |= _water_figures(run)
     figures["counts"] = {
         name.removeprefix("count_"): int(count)
         for name, count in accounts.items()
         if name.startswith("count_")
     }
+    return figures
+
+
+def _water_figures(run: Run) -> dict[str, Any]:
+    numbered = [f"{i} {kind}" for i, (kind, _) in enumerate(run.discharge)]
+    inflows = [inflow for _, inflow in run.discharge]
+    figures: dict[str, Any] = {"inflow by condition, m3/s per m": dict(zip(numbered, inflows, strict=True))}
+    if (balance := run.water_balance) is not None:
+        totals = dict(zip(numbered, balance[0], strict=True))
+        figures["water in all by condition, m3 per m"] = totals
+        figures["gain of stored water, m3 per m"] = balance[1]
     return figures
 
 

@@ -226,18 +226,16 @@ class Simulation:
 
     @property
     def dt(self) -> float:
-        """Present time step, s."""
-        return (
-            self._present.time_step
-            if isinstance(self._present, _core.Seepage)
-            else self._present.time_step[0]
-        )
+        """Present time step, s; 0 on the way to a steady state of seepage, in which no time passes."""
+        if isinstance(self._present, _core.Seepage):
+            return 0.0 if self.duration is None else self._present.time_step
+        return self._present.time_step[0]
 
     @property
     def dt_limit(self) -> str:
         """What limits the time step."""
         if isinstance(self._present, _core.Seepage):
-            return "change of saturation"
+            return "steady state" if self.duration is None else "change of saturation"
         return self._present.time_step[1]
 
     @property
