@@ -245,13 +245,20 @@ def test_stopping_and_stepping_change_nothing(scene: Scene) -> None:
         assert other.water_balance == whole.water_balance
 
 
-def test_a_duration_is_met_and_frames_are_written_on_the_way(tmp_path: Path) -> None:
-    scene = drawdown().model_copy(update={"output": Output(field_dt=1.0e4)})
+@pytest.mark.parametrize("interval", [0.25, 1.0e4])
+def test_frames_are_written_on_the_way_and_change_nothing(interval: float, tmp_path: Path) -> None:
+    scene = drawdown().model_copy(update={"output": Output(field_dt=interval)})
     results = run(scene, tmp_path, threads=1)
     assert results.times[0] == 0.0
     assert results.times[-1] == 4.0e4
-    assert len(results.times) == 5
+    assert (np.diff(results.times) > 0.0).all()
     assert (np.diff(results.field_series("head").mean(axis=1)) < 0.0).all()
+    whole = Simulation(scene, threads=1)
+    whole.run_stage()
+    np.testing.assert_array_equal(results.field("head"), whole.field("head"))
+    assert results.accounts("seepage")["steps"] == whole.steps
+    # One at the step nearest to each multiple, and one at the end; no more than steps.
+    assert len(results.times) <= (6 if interval == 1.0e4 else whole.steps + 1)
 
 
 def test_water_leaves_by_a_drain_and_what_rain_brings_runs_off() -> None:
@@ -434,9 +441,12 @@ def test_plan_tells_what_seepage_costs() -> None:
     assert stage.duration is None
     assert f"seepage: to its steady state, {stage.steps} steps" in str(planned)
     assert planned.file_size > 0
-    (stage,) = drawdown().plan().stages
+    changing = drawdown().plan()
+    (stage,) = changing.stages
     assert (stage.duration, stage.dt_limit) == (4.0e4, "change of saturation")
     assert stage.dt > 0.0
+    # No more frames than steps, whatever the interval: 80 nodes of three fields and places.
+    assert changing.file_size < 6 * 8 * 80 * (stage.duration / stage.dt + 2)
 
 
 def test_columns_do_not_go_with_seepage(tmp_path: Path) -> None:

@@ -288,9 +288,12 @@ def _cut_at(begin: float) -> Callable[[MotionSpec], MotionSpec]:
 
 def _file_size(scene: Scene, simulation: Simulation, stages: list[StagePlan]) -> int:
     """Bytes of the frames and histories of a whole run, uncompressed."""
-    duration = sum(stage.duration for stage in stages if stage.duration is not None)
+    # Water that flows before the grains may move writes no frames of its own.
+    written = [stage for stage in stages if scene.is_at_rest or stage.name != "seepage"]
+    lasting = [(stage.duration, stage.dt) for stage in written if stage.duration is not None]
+    duration = sum(duration for duration, _ in lasting)
     components = 3 + sum(3 if name in VECTOR_FIELDS else 1 for name in written_fields(scene))
-    frames = duration / scene.output.field_dt + len(stages)
+    frames = sum(duration / max(scene.output.field_dt, dt) for duration, dt in lasting) + len(stages)
     samples = duration / scene.output.history_dt
     channels = len(simulation.take_histories()[1]) * len(simulation.probes)
     return round(

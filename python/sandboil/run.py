@@ -162,7 +162,12 @@ def _run_stage(simulation: Simulation, writer: Writer, interrupt: Interrupt, bar
     bar.begin(simulation)
     if simulation.duration is not None:
         writer.write(spent())
-    target = interval
+
+    def next_target() -> float:
+        # The next multiple that is not within the half step by which one is met.
+        return interval * (math.floor((simulation.time + 0.5 * simulation.dt) / interval) + 1.0)
+
+    target = next_target()
     try:
         while not simulation.stage_is_complete:
             reached = simulation.advance(target, LOOK_INTERVAL)
@@ -175,8 +180,7 @@ def _run_stage(simulation: Simulation, writer: Writer, interrupt: Interrupt, bar
             if reached and not simulation.stage_is_complete:
                 _refuse_full_disk(writer.path)
                 writer.write(spent())
-                # The next multiple that is not within the half step by which the last one was met.
-                target = interval * (math.floor((simulation.time + 0.5 * simulation.dt) / interval) + 1.0)
+                target = next_target()
     except SandboilError:
         simulation.finish_histories()
         writer.write(spent())
