@@ -1,6 +1,7 @@
 """The numerical core. Private: arrays in and out, tension positive. Users take `sandboil.Simulation`."""
 
 from collections.abc import Sequence
+from os import PathLike
 from typing import Any, final
 
 import numpy as np
@@ -17,6 +18,7 @@ __all__ = [
     "pm4sand_constants",
     "saturation",
     "small_strain_moduli",
+    "stored_note",
     "stress_node_offset",
 ]
 
@@ -30,6 +32,7 @@ def carries(material: dict[str, Any], stress: tuple[float, float, float, float])
 def pm4sand_constants(
     material: dict[str, Any], stress: tuple[float, float, float, float]
 ) -> dict[str, float]: ...
+def stored_note(path: str | PathLike[str]) -> bytes: ...
 def stress_node_offset(dx: float, dy: float) -> tuple[float, float]: ...
 def saturation(
     curve: tuple[float, float, float, float], pressure_head: NDArray[np.float64]
@@ -65,6 +68,9 @@ class Seepage:
 @final
 class Simulation:
     def __new__(cls, description: dict[str, Any], threads: int) -> Simulation: ...
+    def store(self, path: str | PathLike[str], note: bytes) -> None: ...
+    @staticmethod
+    def restore(description: dict[str, Any], path: str | PathLike[str], threads: int) -> Simulation: ...
     def begin_gravity(self, *, tolerance: float, max_steps: int) -> None: ...
     def begin_shaking(self, stage: dict[str, Any]) -> None: ...
     def advance(self, *, steps: int, until: float, seconds: float) -> bool: ...

@@ -74,6 +74,10 @@ class SimulationDiverged(SandboilError):
         )
 
 
+class DamagedState(SandboilError):
+    """A stored state whose bytes are not as they were written."""
+
+
 class SandboilWarning(UserWarning):
     """An answer that may not be what was meant: the text says why, and what would mend it."""
 

@@ -1,7 +1,8 @@
 //! Core errors as Python exceptions. The classes live in `sandboil._errors`; here they are looked up and filled.
 
 use pyo3::{prelude::*, types::PyDict};
-use sandboil_solver::SolverError;
+use sandboil_solver::{SolverError, StateError};
+use std::path::Path;
 
 /// A solver error on its way to Python.
 pub struct CoreError(pub SolverError);
@@ -38,6 +39,21 @@ fn exception(py: Python<'_>, error: SolverError) -> PyResult<PyErr> {
             classes.getattr("InvalidInput")?.call((), Some(&keywords))?
         }
         other => classes.getattr("SandboilError")?.call1((other.to_string(),))?,
+    };
+    Ok(PyErr::from_value(raised))
+}
+
+/// What is wrong with the stored state in a file.
+pub fn state_error(py: Python<'_>, path: &Path, error: &StateError) -> PyResult<PyErr> {
+    let classes = py.import("sandboil._errors")?;
+    let raised = match error {
+        StateError::Foreign | StateError::Damaged(_) => {
+            classes.getattr("DamagedState")?.call1((format!("{} {error}", path.display()),))?
+        }
+        StateError::Version { .. } | StateError::Build | StateError::OtherModel => {
+            let hint = "run the scene anew, or go on with the sandboil and the scene that it is of";
+            classes.getattr("InvalidInput")?.call1(("state", path, error.to_string(), hint))?
+        }
     };
     Ok(PyErr::from_value(raised))
 }

@@ -21,7 +21,7 @@ mod _core {
     #[pymodule_export]
     use crate::shear_cell::ShearCell;
     #[pymodule_export]
-    use crate::simulation::{Simulation, stress_node_offset};
+    use crate::simulation::{Simulation, stored_note, stress_node_offset};
 
     #[pymodule_init]
     fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {

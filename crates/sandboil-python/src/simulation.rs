@@ -1,13 +1,22 @@
 //! The solver as a Python class: arrays in, arrays out, chunks of steps in between.
 
 use crate::{
-    errors::CoreError,
+    errors::{CoreError, state_error},
     material::{integrator, retention, soil},
 };
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, ToPyArray, ndarray::Array};
-use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
+use pyo3::{
+    exceptions::PyValueError,
+    prelude::*,
+    types::{PyBytes, PyDict},
+};
 use sandboil_solver as solver;
-use std::time::{Duration, Instant};
+use std::{
+    fs::{self, File},
+    io::{self, BufWriter},
+    path::PathBuf,
+    time::{Duration, Instant},
+};
 
 /// Steps between looks at the clock.
 const STEPS_PER_LOOK: u64 = 32;
@@ -208,6 +217,17 @@ pub fn stress_node_offset(dx: f64, dy: f64) -> (f64, f64) {
     (offset.x, offset.y)
 }
 
+/// The note that was stored with a state in a file, whichever build wrote it.
+#[pyfunction]
+#[allow(clippy::needless_pass_by_value)] // PyO3 gives paths as owned values only
+pub fn stored_note(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyBytes>> {
+    let bytes = py.detach(|| fs::read(&path))?;
+    match py.detach(|| solver::state::note(&bytes)) {
+        Ok(note) => Ok(PyBytes::new(py, note)),
+        Err(error) => Err(state_error(py, &path, &error)?),
+    }
+}
+
 /// A section under way. Arrays are copies, in the order of the nodes given.
 #[pyclass(module = "sandboil._core")]
 pub struct Simulation {
@@ -222,6 +242,37 @@ impl Simulation {
         let inner =
             description.py().detach(|| solver::Simulation::new(&model, threads)).map_err(CoreError)?;
         Ok(Self { inner })
+    }
+
+    /// Writes the state and a note to a file, and returns when the disk has them.
+    fn store(&self, py: Python<'_>, path: PathBuf, note: &[u8]) -> PyResult<()> {
+        let inner = &self.inner;
+        let written = py.detach(move || -> io::Result<()> {
+            let file = File::create(&path)?;
+            inner.store(note, BufWriter::new(&file))?;
+            file.sync_all()
+        });
+        Ok(written?)
+    }
+
+    /// The section of the description as it was stored in a file.
+    #[staticmethod]
+    #[allow(clippy::needless_pass_by_value)] // PyO3 gives paths as owned values only
+    fn restore(
+        py: Python<'_>,
+        description: &Bound<'_, PyDict>,
+        path: PathBuf,
+        threads: usize,
+    ) -> PyResult<Self> {
+        let model = model(description)?;
+        let restored = py.detach(|| -> io::Result<_> {
+            Ok(solver::Simulation::restore(&model, threads, &fs::read(&path)?))
+        });
+        match restored? {
+            Ok(inner) => Ok(Self { inner }),
+            Err(solver::SolverError::State(error)) => Err(state_error(py, &path, &error)?),
+            Err(other) => Err(CoreError(other).into()),
+        }
     }
 
     #[pyo3(signature = (*, tolerance, max_steps))]

@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// How the cone is fitted to the friction angle in plane strain.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Matching {
     /// `a = tan(phi)/sqrt(9 + 12 tan^2(phi))`, as in most of the literature: exact for associated flow, up to some
     /// percent too weak for `psi < phi`.
@@ -22,7 +22,7 @@ pub enum Matching {
 }
 
 /// Loss of strength with plastic shear strain.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Softening {
     /// Strength that is left; no component above that of the peak.
     pub residual: Strength,
@@ -31,7 +31,7 @@ pub struct Softening {
 }
 
 /// Parameters beside the elastic ones.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Parameters {
     /// Strength at first.
     pub peak: Strength,
@@ -44,7 +44,7 @@ pub struct Parameters {
 }
 
 /// Constants of the cone and of its flow.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Cone {
     /// Slope `a` against the first invariant.
     friction: f64,
@@ -90,7 +90,7 @@ impl Cone {
 }
 
 /// Drucker-Prager material.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DruckerPrager {
     elastic: Elastic,
     peak: Cone,
@@ -102,7 +102,7 @@ pub struct DruckerPrager {
 }
 
 /// What a point remembers.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     stress: Stress,
     plastic_shear: f64,

@@ -6,7 +6,7 @@ use crate::{
 };
 
 /// Linear isotropic elastic material.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Elastic {
     moduli: Moduli,
 }

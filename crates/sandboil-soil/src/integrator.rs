@@ -2,7 +2,7 @@
 ///
 /// An increment is first cut into equal parts; every part is a committed increment of its own (reversal check,
 /// integration, cumulative fabric), so results hardly depend on the host's step.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Integrator {
     /// Two-stage modified Euler with error control (Sloan, Abbo and Sheng 2001).
     ModifiedEuler {

@@ -27,7 +27,7 @@ pub use strength::Strength;
 pub use tensor::{Deviator, StrainIncrement, Stress};
 
 /// Current elastic moduli of a material, kPa.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Moduli {
     /// Bulk modulus K (three-dimensional), kPa.
     pub bulk: f64,

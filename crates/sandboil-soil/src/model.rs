@@ -8,6 +8,7 @@ use crate::{
     elastic::Elastic, mohr_coulomb::MohrCoulomb, pm4sand::PM4Sand, pressure_elastic::PressureElastic,
     total_stress::TotalStress,
 };
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::fmt::Debug;
 
 /// A constitutive model: checked parameters, and pure functions from state and strain to state.
@@ -15,8 +16,8 @@ use std::fmt::Debug;
 /// Stress is effective, kPa, tension positive, in space axes; strain is tension positive with engineering shear.
 /// A model turns its state with the material: `StrainIncrement::spin` is part of every increment.
 pub trait SoilModel: Clone + Debug + Send + Sync {
-    /// All that one point remembers, its stress included.
-    type State: Copy + Debug + Send + Sync;
+    /// All that one point remembers, its stress included. It can be stored, so that a run can be gone on with.
+    type State: Copy + Debug + Send + Sync + Serialize + DeserializeOwned;
 
     /// State at rest under an effective stress (kPa, tension positive), at zero strain. `void_ratio` is that of the
     /// point; `None` takes the model's own, and a model whose answer does not depend on density ignores it.
@@ -73,7 +74,7 @@ pub trait SoilModel: Clone + Debug + Send + Sync {
 }
 
 /// A soil model as one region uses it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Soil {
     /// Linear elasticity.
     Elastic(Elastic),

@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Mohr-Coulomb material.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct MohrCoulomb {
     elastic: Elastic,
     sin_phi: f64,

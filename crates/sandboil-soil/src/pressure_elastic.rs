@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Elastic material stiffened by the pressure at rest.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PressureElastic {
     reference: Moduli,
     exponent: f64,
@@ -18,7 +18,7 @@ pub struct PressureElastic {
 }
 
 /// What a point remembers: its stress and the elasticity it was given.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     stress: Stress,
     elastic: Elastic,

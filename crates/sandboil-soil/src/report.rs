@@ -1,5 +1,5 @@
 /// What happened inside one or many updates: the guards that acted are counted, never silent.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct UpdateReport {
     /// Accepted sub-steps of plastic integration.
     pub substeps: u64,

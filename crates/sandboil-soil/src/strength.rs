@@ -3,7 +3,7 @@
 use crate::{SoilError, error::check};
 
 /// Cohesion, friction angle and dilation angle.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Strength {
     /// Cohesion c, kPa.
     pub c: f64,

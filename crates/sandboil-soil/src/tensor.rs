@@ -4,7 +4,7 @@ use crate::error::{SoilError, finite};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 /// Effective stress, kPa, tension positive; `x` horizontal, `y` up, `zz` out of plane.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Stress {
     /// Horizontal normal stress, kPa.
     pub xx: f64,
@@ -110,7 +110,7 @@ impl StrainIncrement {
 }
 
 /// Deviator of a symmetric plane tensor: `xx = -yy = half_difference`.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Deviator {
     /// `(xx - yy)/2`.
     pub half_difference: f64,

@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// What the strength bounds.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Criterion {
     /// The radius of Mohr's circle in the plane. The out-of-plane stress stays elastic.
     #[default]
@@ -21,7 +21,7 @@ pub enum Criterion {
 }
 
 /// How strength falls from its peak to the residual one with plastic shear strain `kappa`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Decay {
     /// `S_r + (S_u - S_r) exp(-kappa/kappa_s)`.
     #[default]
@@ -31,7 +31,7 @@ pub enum Decay {
 }
 
 /// Loss of strength with plastic shear strain.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Softening {
     /// Residual strength, kPa.
     pub residual: f64,
@@ -42,7 +42,7 @@ pub struct Softening {
 }
 
 /// Total-stress material.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TotalStress {
     elastic: Elastic,
     criterion: Criterion,
@@ -51,7 +51,7 @@ pub struct TotalStress {
 }
 
 /// What a point remembers.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     stress: Stress,
     plastic_shear: f64,

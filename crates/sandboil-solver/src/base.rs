@@ -9,7 +9,7 @@ use crate::{
 use sandboil_sph::{Csr, Vec2};
 
 /// Velocity history of the upgoing waves at the base: half of an outcrop motion, m/s.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct UpgoingWave {
     /// Sampling interval, s.
     pub interval: f64,
@@ -63,7 +63,7 @@ fn relaxation(z: f64) -> (f64, f64) {
 }
 
 /// A dashpot at a point of an edge, in one direction.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Dashpot {
     /// Index of its point.
     pub point: usize,
@@ -76,7 +76,7 @@ pub struct Dashpot {
 }
 
 /// Dashpots along an edge.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Dashpots {
     all: Vec<Dashpot>,
     /// Weights of the velocity on the edge: rows are points, columns velocity nodes.
@@ -216,7 +216,7 @@ pub fn trace(model: &Model, position: &[Vec2], points: &[Vec2], nodes: &[usize])
 }
 
 /// What the base does vertically while it is shaken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Vertical {
     /// Held, as the elements of a column are: compression waves come back.
     Roller,
@@ -225,7 +225,7 @@ pub enum Vertical {
 }
 
 /// A half-space given by its own properties.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct HalfSpace {
     /// Shear-wave speed, m/s.
     pub shear_speed: f64,
@@ -236,7 +236,7 @@ pub struct HalfSpace {
 }
 
 /// Impedances `rho C_s` and `rho C_p` (kPa s/m) and the speeds (m/s) of the half-space below a point of the base.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Impedance {
     /// Density, Mg/m3.
     pub density: f64,
@@ -247,7 +247,7 @@ pub struct Impedance {
 }
 
 /// Which wave comes to a stretch of the base, and when.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BaseSegment {
     /// Its ends, m; what lies beyond the outermost ones belongs to them.
     pub extent: [f64; 2],
@@ -267,7 +267,7 @@ impl BaseSegment {
 }
 
 /// The base of a shaking stage.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Base {
     /// What it does vertically.
     pub vertical: Vertical,
@@ -305,7 +305,7 @@ impl Base {
 }
 
 /// What comes in at one dashpot of the base: velocities of the half-space's waves, weighted.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Incoming {
     wave: usize,
     /// Delay of the shear and of the compression wave, s.
@@ -320,7 +320,7 @@ struct Incoming {
 /// the stress `sigma_up` of the waves. On a level base this is Eq. 14, `2 rho C_s v_su - eta_s v_x` and the same for P;
 /// the waves rise with level fronts, so on an inclined base their stress turns with the normal and they are late by the
 /// height over the datum.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct CompliantBase {
     dashpots: Dashpots,
     incoming: Vec<Option<Incoming>>,

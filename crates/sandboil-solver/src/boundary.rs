@@ -13,7 +13,7 @@ use sandboil_sph::{Mat2, Source, Vec2};
 use std::collections::BTreeMap;
 
 /// What an edge is in statics.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Support {
     /// Rough: nothing moves on it.
     NoSlip,
@@ -31,7 +31,7 @@ impl Support {
 }
 
 /// A vertical side.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Side {
     /// Where it stands, m.
     pub x: f64,
@@ -42,7 +42,7 @@ pub struct Side {
 }
 
 /// Which of the two sides.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Hand {
     /// Low x.
     Left,
@@ -72,7 +72,7 @@ impl Hand {
 }
 
 /// The edges of a section.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outline {
     /// Lower boundary from left to right, m; empty: none, the section floats.
     pub base: Vec<Vec2>,
@@ -196,7 +196,7 @@ fn normal(along: Vec2) -> Vec2 {
 }
 
 /// What an edge does to the soil in a stage.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Condition {
     /// Held at zero velocity: images move against.
     NoSlip,
@@ -220,7 +220,7 @@ impl Condition {
 }
 
 /// The conditions of all edges in a stage.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Walls {
     /// The base.
     pub base: Condition,
@@ -383,7 +383,7 @@ pub(crate) fn id(index: usize) -> u32 {
 const FARTHEST_FROM_BASE: f64 = 2.0;
 
 /// The nodes along the edges, from which tractions are read and on which they act.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct EdgeNodes {
     /// The lowest node of every column of the lattice, from left to right.
     pub base: Vec<usize>,

@@ -13,7 +13,7 @@ use sandboil_sph::Vec2;
 const COMPONENTS: usize = 4;
 
 /// What a section reads of its column in a step. Rows count from below.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Present {
     /// Nominal effective stress of both stress nodes of every row at the step's beginning, kPa.
     pub stress: Vec<[f64; COMPONENTS]>,
@@ -44,7 +44,7 @@ impl Present {
 }
 
 /// What a column did in a stage, to be read again by a section with the same column under the same motion.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ColumnRecord {
     /// Time between frames, s, the first at the stage's beginning; straight between them.
     pub interval: f64,
@@ -107,14 +107,14 @@ impl ColumnRecord {
 }
 
 /// A column and what a section reads of it.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Column {
     source: Source,
     present: Present,
     recorder: Option<Recorder>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 enum Source {
     Solved {
         simulation: Box<Simulation>,
@@ -320,7 +320,7 @@ impl Column {
 }
 
 /// Frames of a column under way.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 struct Recorder {
     record: ColumnRecord,
     /// Values from which increments count; at a renewal of the geometry they take over its change of frame.

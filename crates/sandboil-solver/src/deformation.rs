@@ -5,7 +5,7 @@ use sandboil_soil::Stress;
 use sandboil_sph::Vec2;
 
 /// Deformation gradient `F = dx/dX` in the plane, rows in space, columns in the geometry's own frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Deformation {
     /// `dx/dX`.
     pub xx: f64,
@@ -24,7 +24,7 @@ impl Default for Deformation {
 }
 
 /// `J F^-T`: carries areas of the geometry's frame into space. Rows in space.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Cofactor([f64; 4]);
 
 impl Deformation {

@@ -20,7 +20,7 @@ use sandboil_sph::{Csr, LeastSquaresFit, Vec2, WendlandQuintic};
 use std::collections::BTreeMap;
 
 /// The correction at work in a stage.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Dispersion {
     /// `b`, m2.
     coefficient: f64,
@@ -30,7 +30,7 @@ pub struct Dispersion {
 
 /// Stress `(xx, xy)` of `K_1` times volume and `b`, kN. With unit speeds Lame's constants are `mu = rho`, `lambda =
 /// -rho`, so that only shape counts: `xx = -yy = rho (a_x,x - a_y,y)` and `xy = rho (a_x,y + a_y,x)`.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct Flux {
     normal: f64,
     shear: f64,

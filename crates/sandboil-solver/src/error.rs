@@ -1,5 +1,6 @@
 //! What can go wrong in a solve, with the numbers a user needs to find the place.
 
+use crate::state::StateError;
 use sandboil_soil::SoilError;
 
 /// Errors of building or advancing a simulation.
@@ -90,6 +91,9 @@ pub enum SolverError {
         /// What happened to it; its nodes count from below.
         source: Box<SolverError>,
     },
+    /// A stored state cannot be gone on with.
+    #[error(transparent)]
+    State(#[from] StateError),
     /// The thread pool could not be made.
     #[error("cannot start {threads} threads: {reason}")]
     Threads {

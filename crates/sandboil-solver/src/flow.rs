@@ -17,7 +17,7 @@ use sandboil_sph::{Csr, Mat2, Vec2};
 
 /// A node whose pressure follows from the prescribed value on the free surface (half-cell rule): only where the
 /// soil lets water out.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 struct SurfaceNode {
     node: u32,
     inner: u32,
@@ -26,7 +26,7 @@ struct SurfaceNode {
 }
 
 /// Excess pore pressure and what moves it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Flow {
     /// Excess pore pressure at velocity nodes, kPa, compression positive.
     pub excess: Vec<f64>,
@@ -44,14 +44,18 @@ pub struct Flow {
     right_hand_side: Vec<f64>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 enum Scheme {
     /// No conductivity: pressure changes by volume strain alone.
     Undrained,
     /// Forward Euler, with or without the acceleration term.
     Explicit { acceleration_term: bool },
     /// Backward Euler; factors belong to a time step.
-    Implicit { factors: Option<(f64, BandedLu)> },
+    Implicit {
+        // Not stored: they are made anew, the same, from what is.
+        #[serde(skip)]
+        factors: Option<(f64, BandedLu)>,
+    },
 }
 
 /// What the caller chose for a stage.

@@ -26,14 +26,14 @@ const SAME: f64 = 1e-9;
 const NO_DIFFERENCE: f64 = 1e-12;
 
 /// Columns beyond the sides of a section and what ties the section to them.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct FreeField {
     columns: Vec<Column>,
     sides: Vec<TiedSide>,
 }
 
 /// What acts on the section at one side.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 struct TiedSide {
     hand: Hand,
     /// Where the side stands when shaking begins, m.
@@ -53,7 +53,7 @@ struct TiedSide {
 }
 
 /// Weights of the column's stress, pressure and base traction in the force on nodes near a side.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 struct SideTables {
     nodes: Vec<usize>,
     /// Volume times weight: rows are `nodes`, columns the stress nodes of the column's rows.

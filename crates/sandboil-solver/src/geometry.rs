@@ -19,7 +19,7 @@ use std::{
 const SKIN: f64 = 0.3;
 
 /// How the velocity `(v_x, v_y)` of a node enters the gradients of both components at a stress node, 1/m.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct VectorWeight {
     /// `grad v_x` is the sum of `x[0] v_x + x[1] v_y`.
     pub x: [Vec2; 2],
@@ -79,7 +79,7 @@ impl MulAssign<f64> for VectorWeight {
 }
 
 /// A table and its transpose: one gathers, the other gives the force back.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Paired<T> {
     /// Rows gather.
     pub forward: Csr<T>,
@@ -101,7 +101,7 @@ impl<T: Copy + AddAssign> Paired<T> {
 }
 
 /// Tables that only a section with water has.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct FlowTables {
     /// `div v` at velocity nodes, component-wise weights with walls folded in (last term of Eq. 7). The
     /// transposed table is weighted with the row's volume: it is the pressure force.
@@ -111,7 +111,7 @@ pub struct FlowTables {
 }
 
 /// Tables of the printed operators (Eqs 6, 10, 11).
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct PrintedTables {
     /// Stress at velocity nodes from stress nodes, Eq. 10.
     pub interpolation: Csr<f64>,
@@ -130,7 +130,7 @@ pub struct PrintedTables {
 }
 
 /// All weights of one geometry.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Geometry {
     /// Gradient at stress nodes from velocity nodes, without walls.
     pub gradient: Paired<GradientWeight>,
@@ -147,7 +147,7 @@ pub struct Geometry {
     list: Lists,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Lists {
     reference: Vec<Vec2>,
     /// Owners of the sources: a node may have entered an edge's reach since.

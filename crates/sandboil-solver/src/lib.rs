@@ -31,6 +31,7 @@ mod skeleton;
 mod soil_field;
 #[cfg(test)]
 mod spectrum_tests;
+pub mod state;
 mod timestep;
 
 pub use base::{Base, BaseSegment, HalfSpace, Impedance, UpgoingWave, Vertical};
@@ -48,4 +49,5 @@ pub use shear_cell::{CellTest, Departure, ShearCell};
 pub use simulation::{
     ACCELERATION_TERM_CONDUCTIVITY, Counters, Gravity, SHAKING_FACTOR, Shaking, Simulation,
 };
+pub use state::StateError;
 pub use timestep::Criterion;

@@ -57,7 +57,7 @@ impl Conductivity {
 const DIRECTION_TOLERANCE: f64 = 1e-9;
 
 /// One region: a soil with its densities and conductivity.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Region {
     /// The soil model.
     pub soil: Soil,
@@ -76,7 +76,7 @@ pub struct Region {
 }
 
 /// Pore water.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Water {
     /// Unit weight, kN/m3.
     pub unit_weight: f64,
@@ -85,7 +85,7 @@ pub struct Water {
 }
 
 /// The two sets of spatial operators.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Operators {
     /// Least-squares gradient at the stress nodes and its exact transpose as force.
     Conservative,
@@ -94,7 +94,7 @@ pub enum Operators {
 }
 
 /// How pore pressure diffuses in time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Diffusion {
     /// Implicit where it lengthens the step, explicit otherwise.
     Auto,
@@ -105,7 +105,7 @@ pub enum Diffusion {
 }
 
 /// The acceleration term of Eq. 7.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum AccelerationTerm {
     /// On with explicit diffusion and moderate conductivity.
     Auto,
@@ -116,7 +116,7 @@ pub enum AccelerationTerm {
 }
 
 /// Numerical choices.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Numerics {
     /// Spatial operators.
     pub operators: Operators,
@@ -148,7 +148,7 @@ impl Numerics {
 }
 
 /// A complete description of the section.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Model {
     /// Particle spacing in x and y, m.
     pub spacing: Vec2,

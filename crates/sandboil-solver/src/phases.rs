@@ -14,7 +14,7 @@ use std::ops::RangeInclusive;
 const POROSITY_RANGE: RangeInclusive<f64> = 0.05..=0.95;
 
 /// Volumes, porosities and masses of the velocity nodes.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Phases {
     /// Volume per unit thickness, m2.
     volume: Vec<f64>,

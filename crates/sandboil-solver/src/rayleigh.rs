@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 const LARGEST_RATIO: f64 = 0.3;
 
 /// A damping ratio that holds at two frequencies: `xi(w) = a / (2 w) + b w / 2`, less between them, more outside.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rayleigh {
     /// Damping ratio at both frequencies, 1.
     pub ratio: f64,
@@ -60,7 +60,7 @@ impl Rayleigh {
 }
 
 /// Rayleigh damping at work in a stage.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct RayleighDamping {
     law: Rayleigh,
     /// Volume times nominal viscous stress of every stress node, kN/m: what walls feel of it.

@@ -25,7 +25,7 @@ fn filter_weight(distance: f64) -> f64 {
 }
 
 /// Where histories are read: weights on velocity nodes and on stress nodes.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Probes {
     /// Rows are probes, columns velocity nodes.
     pub velocity: Csr<f64>,
@@ -34,7 +34,7 @@ pub struct Probes {
 }
 
 /// Filtered, thinned samples of a fixed set of channels.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Recorder {
     interval: f64,
     channels: usize,

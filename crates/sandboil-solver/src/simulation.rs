@@ -22,10 +22,12 @@ use crate::{
         motion,
     },
     soil_field::SoilField,
+    state::{self, StateError},
     timestep::{Criterion, PressureCoupling, PressureSpectrum, region_limit},
 };
 use sandboil_soil::{Stress, UpdateReport};
 use sandboil_sph::Vec2;
+use std::io::{self, Write};
 
 /// Steps between checks of stability limit, geometry and finiteness.
 pub(crate) const CHECK_INTERVAL: u64 = 16;
@@ -47,7 +49,7 @@ pub(crate) const RUNAWAY_SPEED: f64 = 1e3;
 const MEAN_RESIDUAL: f64 = 0.1;
 
 /// Static stage: gravity on a fixed base, relaxed by kinetic damping.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Gravity {
     /// Largest unbalanced acceleration over gravity at the end.
     pub tolerance: f64,
@@ -56,7 +58,7 @@ pub struct Gravity {
 }
 
 /// Dynamic stage on a compliant base.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Shaking {
     /// Duration, s.
     pub duration: f64,
@@ -87,7 +89,7 @@ pub struct Shaking {
 }
 
 /// Work done, by kind: what a scene does not ask for stays zero.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Counters {
     /// Steps of all stages.
     pub steps: u64,
@@ -111,14 +113,14 @@ pub struct Counters {
     pub soil: UpdateReport,
 }
 
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 enum Active {
     None,
     Gravity { stage: Gravity, kinetic_energy: f64, residual: f64, at_rest: bool },
     Shaking(Box<ActiveShaking>),
 }
 
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 struct ActiveShaking {
     stage: Shaking,
     base: CompliantBase,
@@ -132,7 +134,7 @@ struct ActiveShaking {
 }
 
 /// Result of one chunk of the velocity update.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct MotionSum {
     kinetic_energy: f64,
     acceleration: f64,
@@ -140,12 +142,15 @@ struct MotionSum {
 }
 
 /// A section and its state. Every array that leaves is in the user's node order.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Simulation {
     model: Model,
     /// User's index of each internal node.
     order: Vec<usize>,
+    // The state is the same under any number of threads.
+    #[serde(skip)]
     threads: usize,
+    #[serde(skip)]
     pool: Option<rayon::ThreadPool>,
     geometry: Geometry,
     walls: Walls,
@@ -178,7 +183,6 @@ pub struct Simulation {
     criterion: Criterion,
     counters: Counters,
     sums: Vec<MotionSum>,
-    unit: Vec<()>,
 }
 
 impl Simulation {
@@ -190,10 +194,7 @@ impl Simulation {
         model.validate()?;
         let (model, order) = sorted(model);
         let nodes = model.nodes();
-        let pool = (threads > 1)
-            .then(|| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
-            .transpose()
-            .map_err(|error| SolverError::Threads { threads, reason: error.to_string() })?;
+        let pool = thread_pool(threads)?;
         let phases = Phases::new(&model);
         let walls = Walls::statics(&model.outline);
         let outline = (&model.outline, walls);
@@ -240,11 +241,34 @@ impl Simulation {
             criterion: Criterion::default(),
             counters: Counters { geometry_builds: 1, ..Counters::default() },
             sums: vec![MotionSum::default(); chunks(nodes)],
-            unit: vec![(); nodes],
             phases,
             model,
         };
         simulation.follow_volumes();
+        Ok(simulation)
+    }
+
+    /// Writes all that the simulation is, to be gone on with by [`Simulation::restore`], and a note of the caller's, to
+    /// be read by [`state::note`].
+    ///
+    /// # Errors
+    /// Those of `to`.
+    pub fn store(&self, note: &[u8], to: impl Write) -> io::Result<()> {
+        state::write(self, note, to)
+    }
+
+    /// The simulation that was stored, in the same stage at the same step: it goes on bit for bit as it would have,
+    /// with any number of threads.
+    ///
+    /// # Errors
+    /// [`SolverError::State`] for bytes that are damaged or of another model than the one given, or a thread pool
+    /// that cannot be made.
+    pub fn restore(model: &Model, threads: usize, bytes: &[u8]) -> Result<Self, SolverError> {
+        let mut simulation: Self = state::read(bytes)?;
+        if simulation.model != sorted(model).0 {
+            return Err(StateError::OtherModel.into());
+        }
+        (simulation.threads, simulation.pool) = (threads, thread_pool(threads)?);
         Ok(simulation)
     }
 
@@ -292,7 +316,7 @@ impl Simulation {
     ///
     /// # Errors
     /// A soil model that refuses the stress it is given.
-    pub fn begin_shaking(&mut self, stage: Shaking) -> Result<(), SolverError> {
+    pub fn begin_shaking(&mut self, mut stage: Shaking) -> Result<(), SolverError> {
         for (name, value, allowed) in [
             ("duration", stage.duration, stage.duration > 0.0 && stage.duration.is_finite()),
             ("time_step_factor", stage.time_step_factor, stage.time_step_factor > 0.0),
@@ -363,6 +387,8 @@ impl Simulation {
             }
             None => FreeField::new(&section, stage.free_field, self.gravity, &stage)?,
         };
+        // The columns hold theirs.
+        stage.column_records = [None, None];
         let scheme = self.flow_scheme(stage.time_step_factor);
         let excess = self.flow.take().map(|flow| flow.excess);
         self.flow = Flow::new(&self.model, &self.phases, scheme);
@@ -816,7 +842,8 @@ impl Simulation {
         let mut velocity = std::mem::take(&mut self.velocity);
         let mut acceleration = std::mem::take(&mut self.acceleration);
         let mut sums = std::mem::take(&mut self.sums);
-        let mut unit = std::mem::take(&mut self.unit);
+        // A slice of nothing, which takes no memory: the loops write two arrays.
+        let mut unit = vec![(); self.model.nodes()];
         let threaded = self.threads > 1;
         let nodes = self.model.nodes();
         let mut dispersion = self.dispersion.take();
@@ -854,7 +881,7 @@ impl Simulation {
         });
         self.counters.inertia_corrections += u64::from(dispersion.is_some());
         self.dispersion = dispersion;
-        (self.velocity, self.acceleration, self.sums, self.unit) = (velocity, acceleration, sums, unit);
+        (self.velocity, self.acceleration, self.sums) = (velocity, acceleration, sums);
     }
 
     /// Local damping of Eq. 16 on the whole acceleration, the base's tractions included, against the velocity that
@@ -1352,6 +1379,14 @@ impl Simulation {
             _ => (Vec::new(), Vec::new()),
         }
     }
+}
+
+/// Threads that share the work; one needs no pool.
+fn thread_pool(threads: usize) -> Result<Option<rayon::ThreadPool>, SolverError> {
+    (threads > 1)
+        .then(|| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
+        .transpose()
+        .map_err(|error| SolverError::Threads { threads, reason: error.to_string() })
 }
 
 /// Whether a time step is too far from its target to be kept.

@@ -9,7 +9,7 @@ use sandboil_soil::{StrainIncrement, Stress};
 use sandboil_sph::Vec2;
 
 /// What a stress node carries besides the state of its soil model.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct StressPoint {
     /// Effective stress, kPa, tension positive.
     pub stress: Stress,
@@ -28,7 +28,7 @@ pub struct StressPoint {
 }
 
 /// What the force loop gathers from a stress node.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct NodalShare {
     /// Volume times nominal stress, less the linear part of the velocity filter: rows meet the gradient weight, kN/m.
     tensor: [f64; 4],
@@ -169,7 +169,7 @@ fn sign(value: f64) -> f64 {
 }
 
 /// Stresses that the printed force needs beside those of the stress nodes.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct PrintedStress {
     /// Effective stress `(xx, yy, xy)` at velocity nodes, Eq. 10.
     node: Vec<[f64; 3]>,

@@ -12,21 +12,57 @@ use sandboil_soil::{
     with_model,
 };
 use sandboil_sph::Vec2;
+use serde::{Serialize, Serializer, ser::Error as _};
 use std::{fmt::Debug, ops::Range};
 
 /// One region's stress nodes under one model.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 struct Group {
     region: usize,
     rows: Range<usize>,
     law: Law,
 }
 
-#[derive(Debug)]
+#[derive(Debug, serde::Deserialize)]
+#[serde(try_from = "StoredLaw")]
 enum Law {
     /// Linear elasticity remembers nothing but the stress, which the stress nodes hold already.
     Elastic(Elastic),
-    Plastic(Box<dyn Plastic>),
+    /// A model with a state, and the soil it came from.
+    Plastic(Soil, Box<dyn Plastic>),
+}
+
+/// A [`Law`] as it is stored: whichever state a plastic model has, as bytes.
+#[derive(serde::Serialize, serde::Deserialize)]
+enum StoredLaw {
+    Elastic(Elastic),
+    Plastic(Soil, Vec<u8>),
+}
+
+impl Serialize for Law {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Elastic(law) => StoredLaw::Elastic(*law),
+            Self::Plastic(soil, rows) => {
+                StoredLaw::Plastic(soil.clone(), rows.states().map_err(S::Error::custom)?)
+            }
+        }
+        .serialize(serializer)
+    }
+}
+
+impl TryFrom<StoredLaw> for Law {
+    type Error = postcard::Error;
+
+    fn try_from(stored: StoredLaw) -> postcard::Result<Self> {
+        match stored {
+            StoredLaw::Elastic(law) => Ok(Self::Elastic(law)),
+            StoredLaw::Plastic(soil, states) => {
+                let rows = with_model!(&soil, law => restored_rows(law, &states)?);
+                Ok(Self::Plastic(soil, rows))
+            }
+        }
+    }
 }
 
 /// Outcome of one chunk of updates.
@@ -37,11 +73,26 @@ struct Outcome {
 }
 
 /// The soil models of a stage.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+#[serde(from = "StoredSoilField")]
 pub struct SoilField {
     groups: Vec<Group>,
+    /// Of the chunks of the longest group, in a step.
+    #[serde(skip)]
     outcomes: Vec<Outcome>,
-    unit: Vec<()>,
+}
+
+/// What of a [`SoilField`] is stored.
+#[derive(serde::Deserialize)]
+struct StoredSoilField {
+    groups: Vec<Group>,
+}
+
+impl From<StoredSoilField> for SoilField {
+    fn from(StoredSoilField { groups }: StoredSoilField) -> Self {
+        let longest = groups.iter().map(|group| group.rows.len()).max().unwrap_or(0);
+        Self { groups, outcomes: vec![Outcome::default(); chunks(longest)] }
+    }
 }
 
 /// The velocity field of a step, and what the force loop wants of it.
@@ -67,6 +118,8 @@ trait Plastic: Debug + Send + Sync {
     fn void_ratio(&self, row: usize) -> Option<f64>;
     fn points(&self) -> usize;
     fn state_bytes(&self) -> usize;
+    /// The states as they are stored.
+    fn states(&self) -> postcard::Result<Vec<u8>>;
 }
 
 #[derive(Debug)]
@@ -119,6 +172,10 @@ impl<M: SoilModel> Plastic for Rowed<M> {
 
     fn state_bytes(&self) -> usize {
         size_of_val(self.states.as_slice())
+    }
+
+    fn states(&self) -> postcard::Result<Vec<u8>> {
+        postcard::to_stdvec(&self.states)
     }
 }
 
@@ -184,7 +241,8 @@ impl SoilField {
         Self::build(model, |region, rows| {
             let soil = &model.regions[region].soil;
             let Soil::Elastic(elastic) = soil else {
-                return with_model!(soil, law => Ok(Law::Plastic(plastic_rows(law, region, rows, points, void_ratio)?)));
+                let rows = with_model!(soil, law => plastic_rows(law, region, rows, points, void_ratio)?);
+                return Ok(Law::Plastic(soil.clone(), rows));
             };
             for point in &mut points[rows] {
                 set_moduli(point, elastic.constants());
@@ -197,12 +255,11 @@ impl SoilField {
         model: &Model,
         mut law: impl FnMut(usize, Range<usize>) -> Result<Law, SolverError>,
     ) -> Result<Self, SolverError> {
-        let groups: Vec<Group> = groups(model)
+        let groups = groups(model)
             .into_iter()
             .map(|(region, rows)| Ok(Group { region, law: law(region, rows.clone())?, rows }))
             .collect::<Result<_, SolverError>>()?;
-        let longest = groups.iter().map(|group| group.rows.len()).max().unwrap_or(0);
-        Ok(Self { groups, outcomes: vec![Outcome::default(); chunks(longest)], unit: vec![(); longest] })
+        Ok(StoredSoilField { groups }.into())
     }
 
     /// Moves every stress node through one step: strain from the velocity field, stress from the soil model,
@@ -228,7 +285,8 @@ impl SoilField {
             let b = &mut shares[group.rows.clone()];
             match &mut group.law {
                 Law::Elastic(elastic) => {
-                    let c = &mut self.unit[..a.len()];
+                    // A slice of nothing, which takes no memory: the loop writes two arrays.
+                    let c = &mut vec![(); a.len()];
                     for_each_chunk(threaded, Rows { a, b, c }, outcomes, |first, rows, _| {
                         for (k, (point, share)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
                             let s = first_row + first + k;
@@ -240,7 +298,7 @@ impl SoilField {
                         }
                     });
                 }
-                Law::Plastic(law) => {
+                Law::Plastic(_, law) => {
                     let flowing = Flowing { geometry, velocity, filter, dt };
                     law.step(threaded, flowing, first_row, (a, b), outcomes, integrator);
                     for outcome in outcomes.iter() {
@@ -261,14 +319,14 @@ impl SoilField {
         let group = self.groups.iter().find(|group| group.rows.contains(&s))?;
         match &group.law {
             Law::Elastic(_) => None,
-            Law::Plastic(law) => law.void_ratio(s - group.rows.start),
+            Law::Plastic(_, law) => law.void_ratio(s - group.rows.start),
         }
     }
 
     fn plastic_groups(&self) -> impl Iterator<Item = &dyn Plastic> {
         self.groups.iter().filter_map(|group| match &group.law {
             Law::Elastic(_) => None,
-            Law::Plastic(law) => Some(&**law),
+            Law::Plastic(_, law) => Some(&**law),
         })
     }
 
@@ -303,6 +361,10 @@ fn plastic_rows<M: SoilModel + 'static>(
         states.push(state);
     }
     Ok(Box::new(Rowed { model: law.clone(), states }))
+}
+
+fn restored_rows<M: SoilModel + 'static>(law: &M, states: &[u8]) -> postcard::Result<Box<dyn Plastic>> {
+    Ok(Box::new(Rowed { model: law.clone(), states: postcard::from_bytes(states)? }))
 }
 
 fn set_moduli(point: &mut StressPoint, moduli: Moduli) {

@@ -35,7 +35,7 @@ const SPECTRUM_SAMPLES: u32 = 24;
 const BISECTIONS: u32 = 12;
 
 /// What limits the time step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Criterion {
     /// Compression wave of the drained skeleton.
     #[default]
@@ -64,7 +64,7 @@ impl Criterion {
 }
 
 /// How pore pressure takes part in the limit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum PressureCoupling {
     /// No water, or frozen pressure.
     None,
@@ -90,7 +90,7 @@ pub fn lattice(model: &Model, at: Vec2) -> Vec<Member> {
 }
 
 /// How the pressure operators of Eq. 7 see waves on the undeformed lattice.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PressureSpectrum {
     /// Pairs of eigenvalues, 1/m2: of the divergence followed by its transpose, and of the Laplacian.
     eigenvalues: Vec<(f64, f64)>,

@@ -6,7 +6,7 @@
 use crate::{Vec2, sparse::index};
 
 /// A lateral period: the domain repeats in `x` every `width` metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Period {
     /// Width of the repeating domain, m.
     pub width: f64,
@@ -24,7 +24,7 @@ pub struct Source {
 }
 
 /// One listed pair, seen from the query point.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Neighbour {
     /// Index of the source in the slice given to [`NeighbourList::build`].
     pub source: u32,
@@ -33,7 +33,7 @@ pub struct Neighbour {
 }
 
 /// Neighbours of every query point within a radius plus a skin.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NeighbourList {
     start: Vec<u32>,
     pairs: Vec<Neighbour>,

@@ -61,7 +61,7 @@ pub fn stencil(
 }
 
 /// Weight of one node in the gradient at a stress node.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct GradientWeight {
     /// `g_sj`, 1/m: `grad f = sum f_j g_sj`.
     pub gradient: Vec2,

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, ops::AddAssign};
 
 /// A sparse table in compressed-row form. Columns rise within a row and occur once.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Csr<T> {
     start: Vec<u32>,
     column: Vec<u32>,

@@ -13,7 +13,7 @@ const NU_MAX: f64 = 0.4999;
 const PHI_CV_MAX: f64 = 89.0;
 
 /// Parameters as the user gives them; `None` takes the model's default.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Parameters {
     /// Apparent relative density `D_R`, fraction in (0, 1].
     pub dr: f64,
@@ -64,7 +64,7 @@ pub struct Parameters {
 }
 
 /// Choices that are not material parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "four independent switches, each of the published model")]
 pub struct Options {
     /// No plastic modulus (and no hardening) outside the bounding surface, also while dilating: the rule of
@@ -91,7 +91,7 @@ impl Default for Options {
 }
 
 /// The complete set of constants, defaults filled in (manual, section 3.5).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Constants {
     /// Apparent relative density, fraction.
     pub dr: f64,
@@ -149,7 +149,7 @@ impl Constants {
 }
 
 /// A validated PM4Sand material.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PM4Sand {
     pub(super) constants: Constants,
     pub(super) options: Options,

@@ -24,7 +24,7 @@ impl Strain {
 
 /// Three independent components. The component rule of the apparent back-stress ratio needs them: it may leave
 /// that tensor slightly non-traceless, and keeps it so.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Components(pub [f64; 3]);
 
 impl Components {
@@ -43,7 +43,7 @@ impl Components {
 }
 
 /// Stress added to what the host receives because the initial stress was not admissible. Compression positive.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Offset {
     pub mean: f64,
     pub deviator: Deviator,
@@ -52,7 +52,7 @@ pub(super) struct Offset {
 
 /// State of one PM4Sand stress point. Made by [`crate::SoilModel::initialise`]; all tensors in the material frame,
 /// compression positive.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     /// In-plane mean effective stress p, kPa.
     pub(super) mean: f64,

@@ -8,6 +8,7 @@ mod free_field;
 mod half_space;
 mod open_edges;
 mod rayleigh;
+mod resume;
 mod seepage;
 mod shear_cell;
 mod stages;

@@ -1,0 +1,148 @@
+//! A simulation as bytes. All that a step reads is stored as it is, the weight tables included, so that nothing has to
+//! be rebuilt to the last bit.
+//!
+//! ```text
+//! magic             8 bytes
+//! format version    u32
+//! build             u32, of the sources that wrote it
+//! length of note    u64
+//! note              whatever the caller wants to find again
+//! simulation        postcard
+//! checksum          u32, CRC-32 of all before
+//! ```
+//!
+//! Numbers are little endian. The layout of a simulation is that of its types, which change with the sources: bytes of
+//! another build are refused rather than misread.
+
+use crc32fast::Hasher;
+use serde::{Serialize, de::DeserializeOwned};
+use std::io::{self, Write};
+
+const MAGIC: &[u8] = b"SANDBOIL";
+/// Raised when what stands around a simulation changes.
+const FORMAT_VERSION: u32 = 1;
+
+/// Why stored bytes cannot be gone on with.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum StateError {
+    /// Bytes of something else.
+    #[error("is no stored simulation")]
+    Foreign,
+    /// Bytes of another layout.
+    #[error("has format version {found}, and {FORMAT_VERSION} is needed")]
+    Version {
+        /// The version found.
+        found: u32,
+    },
+    /// Bytes that are not as they were written.
+    #[error("is damaged: {0}")]
+    Damaged(&'static str),
+    /// Bytes that another build wrote.
+    #[error("was stored by another build of sandboil")]
+    Build,
+    /// A state of another section.
+    #[error("is that of another section")]
+    OtherModel,
+}
+
+/// Sums up what passes through, and keeps the error that postcard would lose.
+struct Summed<W> {
+    to: W,
+    sum: Hasher,
+    failure: Option<io::Error>,
+}
+
+impl<W: Write> Write for Summed<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self.to.write(bytes) {
+            Ok(taken) => {
+                self.sum.update(&bytes[..taken]);
+                Ok(taken)
+            }
+            Err(error) => {
+                let kind = error.kind();
+                self.failure = Some(error);
+                Err(kind.into())
+            }
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
+/// What distinguishes the sources that this program was built from.
+const BUILD: [u8; 4] = match u32::from_str_radix(env!("SANDBOIL_SOURCES"), 16) {
+    Ok(sum) => sum.to_le_bytes(),
+    Err(_) => panic!("the build script gives a number in base 16"),
+};
+
+/// Writes a state and a note.
+///
+/// # Errors
+/// Those of `to`.
+pub fn write(state: &impl Serialize, note: &[u8], to: impl Write) -> io::Result<()> {
+    let mut to = Summed { to, sum: Hasher::new(), failure: None };
+    to.write_all(MAGIC)?;
+    to.write_all(&FORMAT_VERSION.to_le_bytes())?;
+    to.write_all(&BUILD)?;
+    to.write_all(&(note.len() as u64).to_le_bytes())?;
+    to.write_all(note)?;
+    if let Err(error) = postcard::to_io(state, &mut to) {
+        return Err(to.failure.unwrap_or_else(|| io::Error::other(error)));
+    }
+    let Summed { mut to, sum, .. } = to;
+    to.write_all(&sum.finalize().to_le_bytes())?;
+    to.flush()
+}
+
+/// What stands in the bytes of a state.
+struct Parts<'a> {
+    build: [u8; 4],
+    note: &'a [u8],
+    state: &'a [u8],
+}
+
+fn parts(bytes: &[u8]) -> Result<Parts<'_>, StateError> {
+    const SHORT: StateError = StateError::Damaged("it ends too early");
+    let rest = bytes.strip_prefix(MAGIC).ok_or(StateError::Foreign)?;
+    let (version, _) = rest.split_first_chunk().ok_or(SHORT)?;
+    match u32::from_le_bytes(*version) {
+        FORMAT_VERSION => {}
+        found => return Err(StateError::Version { found }),
+    }
+    let (summed, sum) = bytes.split_last_chunk().ok_or(SHORT)?;
+    if crc32fast::hash(summed) != u32::from_le_bytes(*sum) {
+        return Err(StateError::Damaged("its checksum is not that of its bytes"));
+    }
+    let rest = summed.get(MAGIC.len() + version.len()..).ok_or(SHORT)?;
+    let (build, rest) = rest.split_first_chunk().ok_or(SHORT)?;
+    let (length, rest) = rest.split_first_chunk().ok_or(SHORT)?;
+    let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| SHORT)?;
+    let (note, state) = rest.split_at_checked(length).ok_or(SHORT)?;
+    Ok(Parts { build: *build, note, state })
+}
+
+/// The note that was stored with a state, which may be that of another build.
+///
+/// # Errors
+/// Bytes that are no state, of another format version or damaged.
+pub fn note(bytes: &[u8]) -> Result<&[u8], StateError> {
+    Ok(parts(bytes)?.note)
+}
+
+/// The state.
+///
+/// # Errors
+/// Bytes that are no state, of another format version or build, or damaged.
+pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, StateError> {
+    let Parts { build: found, state, .. } = parts(bytes)?;
+    if found != BUILD {
+        return Err(StateError::Build);
+    }
+    match postcard::take_from_bytes(state) {
+        Ok((state, [])) => Ok(state),
+        _ => Err(StateError::Damaged("it does not say what a simulation does")),
+    }
+}
