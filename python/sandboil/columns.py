@@ -6,8 +6,7 @@ same, whatever stands between the sides: a dam with and without its berm.
 
 from __future__ import annotations
 
-import hashlib
-import json
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
+from ._committed_file import sync_folder
 from ._errors import InvalidInput
+from ._fingerprint import fingerprint
 
 Floats = NDArray[np.float64]
 
@@ -105,19 +106,29 @@ def key(section: dict[str, Any], stage: dict[str, Any], hand: str, tolerance: fl
         **{name: base[name] for name in ("vertical", "half_space")},
         **{name: stage[name] for name in ("duration", "local_damping", "rayleigh", "time_step_factor")},
     }
-    text = json.dumps(said, sort_keys=True, default=lambda value: np.asarray(value).tolist())
-    return hashlib.sha256(text.encode()).hexdigest()
+    return fingerprint(said)
 
 
 def save(folder: Path, stage: str, hand: str, fingerprint: str, record: ColumnRecord) -> None:
-    """Add a stage's column to the file of a folder."""
-    with h5py.File(folder / FILE_NAME, "a") as file:
+    """Put a stage's column into the file of a folder, in place of one that is there.
+
+    The file is renewed as a whole: a run that is killed leaves the one before. Raises :class:`OSError`.
+    """
+    path = folder / FILE_NAME
+    part = path.with_suffix(".part")
+    if path.exists():
+        shutil.copyfile(path, part)
+    with h5py.File(part, "a" if path.exists() else "w") as file:
+        if f"{stage}/{hand}" in file:
+            del file[f"{stage}/{hand}"]
         group = file.create_group(f"{stage}/{hand}")
         group.attrs["key"] = fingerprint
         group.attrs["interval_s"] = record.interval
         group.attrs["wet"] = record.wet
         group.create_dataset("impedance", data=record.impedance)
         group.create_dataset("values", data=record.values, compression="gzip", shuffle=True)
+    part.replace(path)
+    sync_folder(folder)
 
 
 def load(
