@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import resource
 import shutil
 import signal
 import subprocess
@@ -175,6 +176,42 @@ def test_divergence_exits_with_3_and_keeps_results(tmp_path: Path) -> None:
     assert results.status == "stopped"
     assert results.message in told
     assert "stopped" in str(results.summary())
+
+
+def test_a_run_that_cannot_write_exits_with_3_and_resumes(tmp_path: Path, finished: Run) -> None:
+    scenes.column().to_toml(tmp_path / "scene.toml")
+    out = tmp_path / "out"
+    # A disk that is full behaves so: files cannot grow.
+    limited = subprocess.run(
+        command("run", tmp_path / "scene.toml", "--out", out, "--checkpoint-time", 0.1),
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (280_000, 280_000)),
+    )
+    assert (limited.returncode, limited.stdout) == (STOPPED, "")
+    told = limited.stderr.replace("\n", " ")
+    for part in ("could not be written", "File too large", "is kept: mend that and resume", "results.h5"):
+        assert part in told
+    assert "Traceback" not in told
+    assert load(out).status == "running"
+    # The newest checkpoint is damaged too: that is told before the run goes on.
+    newest = sorted((out / "checkpoints").glob("0*"))[-1]
+    newest.write_bytes(newest.read_bytes()[:-1])
+    done = called("run", tmp_path / "scene.toml", "--out", out, "--resume")
+    assert done.returncode == DONE
+    assert (
+        done.stderr
+        == f"warning: {newest} is damaged: its checksum is not that of its bytes; it is passed over\n"
+    )
+    assert done.stdout.split()[:2] == ["status", "complete"]
+    np.testing.assert_array_equal(load(out).field("displacement"), finished.field("displacement"))
+
+
+def test_a_folder_without_a_run_is_not_resumed(tmp_path: Path, scene_file: Path) -> None:
+    told = refused("run", scene_file, "--out", tmp_path / "none", "--resume")
+    assert "must hold a run to resume, but has no results.h5" in told
 
 
 def test_interrupting_exits_with_130_and_leaves_a_readable_file(tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -294,19 +293,6 @@ def test_an_interrupted_run_is_readable(tmp_path: Path, number: signal.Signals) 
     # The last frame is that of the moment, and the histories reach it to within their filter.
     assert results.history("velocity_x").time[-1] == pytest.approx(results.times[-1], abs=0.05)
     assert np.isfinite(results.field("velocity")).all()
-
-
-def test_a_full_disk_ends_the_run_while_the_file_can_be_closed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    left = iter([10**9, 10**9, 10**7])
-    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=next(left)))
-    with pytest.raises(SandboilError, match="nearly full: 10 MB are left"):
-        run(scenes.column(), tmp_path)
-    results = load(tmp_path)
-    assert results.status == "stopped"
-    # The start, two frames with room, and the last state.
-    assert len(results.times) == 4
 
 
 def test_handlers_of_signals_are_put_back(tmp_path: Path) -> None:

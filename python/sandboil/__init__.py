@@ -6,7 +6,15 @@ pressures reported to people are positive in compression. Start with :class:`Sce
 
 from . import lab
 from ._core import __version__
-from ._errors import InvalidInput, RunInterrupted, SandboilError, SandboilWarning, SimulationDiverged
+from ._errors import (
+    DamagedState,
+    InvalidInput,
+    ResumeWarning,
+    RunInterrupted,
+    SandboilError,
+    SandboilWarning,
+    SimulationDiverged,
+)
 from ._motion_spec import MotionSpec
 from .boundaries import BaseSegment, CompliantBase, Fixed, FreeField, Periodic, Roller, Sides
 from .discretise import Discretisation, discretise
@@ -50,6 +58,7 @@ __all__ = [
     "Box",
     "CompliantBase",
     "Conductivity",
+    "DamagedState",
     "Discretisation",
     "Drain",
     "DruckerPrager",
@@ -80,6 +89,7 @@ __all__ = [
     "Region",
     "Reservoir",
     "ResponseSpectrum",
+    "ResumeWarning",
     "Roller",
     "Run",
     "RunInterrupted",

@@ -82,6 +82,10 @@ class SandboilWarning(UserWarning):
     """An answer that may not be what was meant: the text says why, and what would mend it."""
 
 
+class ResumeWarning(UserWarning):
+    """A run that is gone on with found something damaged or missing: the text says what, and what it took."""
+
+
 class RunInterrupted(SandboilError):
     """The user stopped the run; the result file is complete up to the last frame."""
 

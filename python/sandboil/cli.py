@@ -6,12 +6,12 @@ from __future__ import annotations
 import sys
 import warnings
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import typer
 
-from . import _cli_lab
-from ._errors import InvalidInput, RunInterrupted, SandboilError, SandboilWarning
+from . import _cli_lab, checkpoint
+from ._errors import InvalidInput, ResumeWarning, RunInterrupted, SandboilError, SandboilWarning
 from .motion import Kind, Motion
 from .plan import plan as plan_of
 from .results import FILE_NAME, load
@@ -80,7 +80,7 @@ def plan(
 @app.command()
 def run(
     scene: SceneFile,
-    out: Annotated[Path, typer.Option(help="Folder for the results; must not hold a run.")],
+    out: Annotated[Path, typer.Option(help="Folder for the results; must not hold a run but to resume.")],
     motion: MotionOption = None,
     unit: UnitOption = None,
     column: ColumnOption = None,
@@ -93,17 +93,36 @@ def run(
     keep_columns: Annotated[
         bool, typer.Option("--keep-columns", help="Keep the free-field columns for other runs.")
     ] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the run in the folder from its last checkpoint.")
+    ] = False,
+    checkpoint_seconds: Annotated[
+        float, typer.Option(help="Wall time between checkpoints, s.")
+    ] = checkpoint.SECONDS,
+    checkpoint_time: Annotated[
+        float | None, typer.Option(help="Also so often in the time of shaking, s.")
+    ] = None,
 ) -> None:
-    """Compute a scene. Ctrl-C ends it with readable results."""
+    """Compute a scene. Ctrl-C ends it with readable results, to be gone on with by --resume."""
     said = _scene(scene, motion, unit, column, kind)
     for doubt in doubts(said, loaded_motions(said)):
-        typer.echo(f"warning: {doubt}", err=True)
+        _tell(doubt)
     try:
         with warnings.catch_warnings():
             # They are told above, before the run's long time.
             warnings.simplefilter("ignore", SandboilWarning)
+            warnings.simplefilter("always", ResumeWarning)
+            warnings.showwarning = _tell
             results = run_scene(
-                said, out, threads=threads, accuracy=accuracy, columns=columns, keep_columns=keep_columns
+                said,
+                out,
+                threads=threads,
+                accuracy=accuracy,
+                columns=columns,
+                keep_columns=keep_columns,
+                resume=resume,
+                checkpoint_seconds=checkpoint_seconds,
+                checkpoint_time=checkpoint_time,
             )
     except InvalidInput:
         raise
@@ -111,6 +130,18 @@ def run(
         error.add_note(f"results until then: {out / FILE_NAME}")
         raise
     typer.echo(str(results.summary()))
+
+
+def _tell(
+    message: Warning | str,
+    category: type[Warning] = UserWarning,
+    filename: str = "",
+    lineno: int = 0,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Print a warning on stderr: its text and nothing of where in the code it came from."""
+    typer.echo(f"warning: {message}", err=True)
 
 
 @app.command()

@@ -12,13 +12,19 @@ Layout of `results.h5` (format version in the root attributes; every dataset has
     /stages/STAGE     attributes: steps, wall time, counters
     /seepage          of a seepage stage: its last fields, discharge and inflow of every condition
     /scene            the scene as TOML with every default written out
+
+While a run goes on, a second copy `.results.h5.twin` lies beside it: one is written while the other can be
+read. The root attributes tell how the run ended and how often it was resumed.
 """
 
 from __future__ import annotations
 
 import csv
 import importlib.metadata
+import json
 import os
+import time
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -31,7 +37,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._errors import InvalidInput, SandboilError
+from ._committed_file import CommittedFile, twin_of
+from ._errors import InvalidInput, ResumeWarning, SandboilError
 from .boundaries import COORDINATE_TOLERANCE
 from .discretise import Floats
 from .motion import Motion, ResponseSpectrum, response_spectrum
@@ -65,6 +72,9 @@ _ROWS_PER_CHUNK = 256
 # Fastest deflate level: it halves the file; higher ones cost time and gain little on noisy floats.
 _DEFLATE = 1
 
+# Least wall time between commits of frames, s: each waits for the disk, some hundredths of a second.
+_COMMIT_INTERVAL = 5.0
+
 # Corner of the low-pass under which surface accelerations of different codes agree, Hz, and its order: peaks
 # above it are single dilation spikes that depend on mesh and time step.
 PGA_CORNER = 10.0
@@ -82,19 +92,76 @@ Time = float | Literal["last"]
 
 
 class Writer:
-    """Writes a run into a new file as it goes; after every frame the file on disk is complete."""
+    """Writes a run into a file as it goes. The file on disk is whole at every moment, also after a kill.
 
-    def __init__(self, path: Path, simulation: Simulation, accuracy: str) -> None:
+    Parameters
+    ----------
+    path : of the file
+    simulation : that is run
+    accuracy : the preset asked for, of a new file
+    mark : what :meth:`mark` told when the state was stored that the run goes on from: all after it is taken
+        away; None: a new file
+
+    Raises :class:`OSError` whenever the file cannot be written.
+    """
+
+    def __init__(
+        self, path: Path, simulation: Simulation, accuracy: str, mark: dict[str, Any] | None = None
+    ) -> None:
         self.path = path
-        self._file = h5py.File(path, "x")
         self._simulation = simulation
+        self._disk = CommittedFile(path, exists=mark is not None)
+        self._file = h5py.File(self._disk, "w" if mark is None else "r+")
         self._frames = 0
         self._clock = 0.0
-        self._write_head(accuracy)
-        self._write_nodes()
-        self._begin_vtk()
-        self._begin_frames()
+        if mark is None:
+            self._write_head(accuracy)
+            self._write_nodes()
+            self._begin_vtk()
+            self._begin_frames()
+        else:
+            self._return_to(mark)
+        try:
+            self.commit()
+        except OSError:
+            self.abandon()
+            raise
+
+    def commit(self) -> None:
+        """Make the disk hold what has been written."""
         self._file.flush()
+        self._disk.commit()
+        self._committed_at = time.monotonic()
+
+    def mark(self) -> dict[str, Any]:
+        """Commit, and tell how far the file has come: to be stored beside the simulation's state."""
+        self.commit()
+        names: list[str] = []
+        rows = {}
+
+        def look(name: str, item: h5py.Group | h5py.Dataset) -> None:
+            names.append(name)
+            if isinstance(item, h5py.Dataset) and item.maxshape[:1] == (None,):
+                rows[name] = len(item)
+
+        self._file.visititems(look)
+        return {"frames": self._frames, "clock": self._clock, "names": names, "rows": rows}
+
+    def _return_to(self, mark: dict[str, Any]) -> None:
+        present: list[str] = []
+        self._file.visit(present.append)
+        for name in sorted(set(present) - set(mark["names"])):
+            # Gone already with the group that held it?
+            if name in self._file:
+                del self._file[name]
+        for name, count in mark["rows"].items():
+            self._file[name].resize(count, axis=0)
+        self._frames, self._clock = mark["frames"], mark["clock"]
+        root = self._file
+        root["VTKHDF/Steps"].attrs["NSteps"] = self._frames
+        root.attrs["status"] = "running"
+        root.attrs["message"] = ""
+        root.attrs["resumed"] = root.attrs["resumed"] + 1
 
     # What is written once
 
@@ -109,6 +176,8 @@ class Writer:
         root.attrs["accuracy"] = accuracy
         root.attrs["status"] = "running"
         root.attrs["message"] = ""
+        root.attrs["resumed"] = 0
+        root.attrs["fingerprints"] = json.dumps(self._simulation.fingerprints)
         _text(root, "scene", [scene.to_toml(resolved=True)])
         for name, motion in zip(scene.stage_names, self._simulation.motions, strict=True):
             if motion is not None:
@@ -193,6 +262,7 @@ class Writer:
             stage.attrs["base_impedance_kPa_s_per_m"] = simulation.base_impedance
         for name, size in simulation.arrays().items():
             stage.attrs[f"bytes_{name}"] = size
+        self.commit()
 
     def _follow_seepage(self) -> None:
         """Write the state at rest anew: the water that a seepage stage has left."""
@@ -212,9 +282,9 @@ class Writer:
             self._clock += self._simulation.time
 
     def write(self, wall_time: float, *, frame: bool = True) -> None:
-        """Append a frame (unless `frame` is false) and the histories since the last one, and flush.
+        """Append a frame (unless `frame` is false) and the histories since the last one.
 
-        `wall_time` (s) is that of the stage so far.
+        They are committed if the last commit is some seconds ago. `wall_time` (s) is the stage's so far.
         """
         simulation = self._simulation
         # Water that flows before the grains may move has other fields than they: its end is their beginning.
@@ -233,7 +303,8 @@ class Writer:
             stage.attrs[f"count_{name}"] = count
         if simulation.stage == "seepage":
             self._replace_seepage()
-        self._file.flush()
+        if time.monotonic() - self._committed_at >= _COMMIT_INTERVAL:
+            self.commit()
 
     def _replace_seepage(self) -> None:
         """Write where the water of a seepage stage is, and what came through its conditions."""
@@ -289,10 +360,40 @@ class Writer:
             _append(self._file[place][name], values)
 
     def close(self, status: Status, message: str = "") -> None:
-        """Say how the run ended and close the file."""
+        """Say how the run ended, commit and close the file."""
         self._file.attrs["status"] = status
         self._file.attrs["message"] = message
+        self.commit()
+        self.abandon()
+
+    def abandon(self) -> None:
+        """Close the file as it was last committed, if it is open."""
         self._file.close()
+        self._disk.close()
+
+
+def holds(path: Path, mark: dict[str, Any]) -> bool:
+    """Whether a results file can be read and reaches the mark of :meth:`Writer.mark`."""
+    try:
+        with h5py.File(path, "r") as file:
+            return all(name in file for name in mark["names"]) and all(
+                len(file[name]) >= count for name, count in mark["rows"].items()
+            )
+    except OSError:
+        return False
+
+
+def repair(path: Path) -> None:
+    """Put the twin of a results file in its place if it cannot be read and the twin can, and tell."""
+    nothing: dict[str, Any] = {"names": [], "rows": {}}
+    twin = twin_of(path)
+    if not holds(path, nothing) and holds(twin, nothing):
+        warnings.warn(
+            f"{path} cannot be read; its second copy is taken, which may be some frames shorter",
+            ResumeWarning,
+            stacklevel=3,
+        )
+        twin.replace(path)
 
 
 def _array(group: h5py.Group, name: str, values: npt.ArrayLike, unit: str) -> h5py.Dataset:
@@ -413,6 +514,8 @@ class Run:
     scene : as it was computed, with every default written out
     status : "complete", "interrupted", "stopped" (by itself; see `message`), or "running" (also if killed)
     message : why the run ended early, else empty
+    resumed : how often the run was gone on with after it had ended early
+    fingerprints : what tells the scene from others, see :attr:`Simulation.fingerprints`
     accuracy : the preset asked for
     versions : of what wrote the file
     probes : points of the histories
@@ -436,6 +539,8 @@ class Run:
             self.scene = Scene.from_toml(file["scene"].asstr()[0])
             self.status: Status = file.attrs["status"]
             self.message: str = file.attrs["message"]
+            self.resumed = int(file.attrs["resumed"])
+            self.fingerprints: dict[str, str] = json.loads(file.attrs["fingerprints"])
             self.accuracy: str = file.attrs["accuracy"]
             self.versions = {
                 name: file.attrs[f"{name}_version"] for name in ("sandboil", "core", "h5py", "numpy")
@@ -805,6 +910,8 @@ def _lines(figures: dict[str, Any], indent: str = "") -> Iterator[str]:
 
 def _summary(run: Run) -> Summary:
     figures = Summary(status=run.status, accuracy=run.accuracy)
+    if run.resumed:
+        figures["resumed, times"] = run.resumed
     if run.message:
         figures["message"] = run.message
     for stage in run.stages:

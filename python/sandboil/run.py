@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import fcntl
 import math
 import os
-import shutil
 import signal
 import threading
 import time
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,9 +19,11 @@ from typing import Any, Literal, get_args
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from ._errors import InvalidInput, RunInterrupted, SandboilError
+from . import checkpoint
+from ._committed_file import twin_of
+from ._errors import InvalidInput, ResumeWarning, RunInterrupted, SandboilError
 from .columns import save as save_column
-from .results import FILE_NAME, Run, Writer
+from .results import FILE_NAME, Run, Writer, holds, repair
 from .scene import Gravity, Scene
 from .simulation import LOOK_INTERVAL, Simulation, unknown_name
 
@@ -34,9 +37,6 @@ ACCURACY: dict[str, dict[str, Any]] = {
     "standard": {},
     "reference": {"integrator_tolerance": 1.0e-6, "diffusion": "explicit"},
 }
-
-# Free space with which a run still ends in order, bytes: the last frame of 100 000 nodes takes 15 MB.
-DISK_RESERVE = 64_000_000
 
 # The time left is told from the speed of the last so many seconds: the soil's cost changes as it liquefies.
 _SPEED_WINDOW = 30.0
@@ -67,60 +67,94 @@ def run(
     *,
     columns: str | os.PathLike[str] | None = None,
     keep_columns: bool = False,
+    resume: bool = False,
+    start: tuple[Run | str | os.PathLike[str], str] | None = None,
+    checkpoint_seconds: float | None = checkpoint.SECONDS,
+    checkpoint_time: float | None = None,
 ) -> Run:
     """Compute a scene into a folder and return its results.
 
     Parameters
     ----------
     scene : what is computed
-    out : folder for `results.h5`, made if need be; it must not hold a run
+    out : folder for `results.h5` and the checkpoints, made if need be; it must not hold a run
     threads : that share the work; results are the same bits for any number
     accuracy : fills only those numerics that the scene leaves open
     progress : whether to show a bar on stderr; default only on a terminal
     columns : folder of a run that kept its free-field columns: they are read instead of solved again
     keep_columns : whether to keep the columns, in `free_field.h5`
+    resume : go on with the run of this scene in `out` from its last checkpoint; the results are the same bits
+        as those of a run that was never stopped. A complete run is returned as it is
+    start : a run, or its folder, and a stage that it has ended: this run begins there, for example with the
+        ground at rest of another one. Everything up to there must be the same in both scenes
+    checkpoint_seconds : wall time between checkpoints, s; None: only at the end of stages, and if interrupted
+    checkpoint_time : also so often in the time of shaking, s
 
     Raises
     ------
     InvalidInput : before any work: a folder that cannot be written or holds a run, a motion that cannot be
-        read or used, an unknown accuracy
-    RunInterrupted : Ctrl-C or a request to terminate; the file is complete up to that moment
-    SimulationDiverged, SandboilError : the run stopped itself; the file holds all until then
+        read or used, an unknown accuracy, a run to resume or start from that is not of this scene
+    RunInterrupted : Ctrl-C or a request to terminate; the results are complete up to that moment, and the
+        run can be resumed there
+    SimulationDiverged, SandboilError : the run stopped itself, or its folder could not be written; the
+        results until then are kept
+
+    Warns
+    -----
+    ResumeWarning : something of a run that is resumed was damaged or missing
     """
     scene = with_accuracy(scene, accuracy)
     folder = Path(out)
-    _refuse_unusable(folder)
+    if resume and start is not None:
+        raise InvalidInput("start", start, "belongs to a new run", "leave out one of start and resume")
+    _refuse_unusable(folder, resume)
     simulation = Simulation(scene, threads, columns=columns, keep_columns=keep_columns)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        writer = Writer(folder / FILE_NAME, simulation, accuracy)
-    except OSError as error:
-        raise _unwritable(folder, error) from error
-    with _interrupts() as interrupt, _progress_bar(progress) as bar:
+    keeper = checkpoint.Keeper(folder, simulation, checkpoint_seconds, checkpoint_time)
+    if start is not None:
+        _start_from(simulation, *start)
+    with _only_user(folder):
+        entry = None
+        if resume:
+            earlier, entry = _earlier(folder, simulation)
+            if earlier.status == "complete":
+                return earlier
+            if entry is None:
+                earlier.path.unlink()
+        keeper.last = entry
         try:
-            for index in range(len(scene.stages)):
-                if index > 0:
-                    simulation.begin_next_stage()
-                _run_stage(simulation, writer, interrupt, bar)
-                for stage, hand, fingerprint, record in simulation.take_columns():
-                    save_column(folder, stage, hand, fingerprint, record)
-        except RunInterrupted as error:
-            writer.close("interrupted", str(error))
-            raise
-        except SandboilError as error:
-            writer.close("stopped", str(error))
-            raise
-    writer.close("complete")
+            mark = None if entry is None else entry.results
+            writer = Writer(folder / FILE_NAME, simulation, accuracy, mark)
+        except OSError as error:
+            raise _unwritable(folder, error) from error
+        try:
+            with _interrupts() as interrupt, _progress_bar(progress) as bar:
+                _run_stages(simulation, writer, keeper, entry, interrupt, bar)
+            keeper.forget()
+        except OSError as error:
+            kept = f"its state at {keeper.last}" if keeper.last else "no state"
+            raise SandboilError(
+                f"the run could not be written to {folder}: {error}; the results last written are whole and "
+                f"{kept} is kept: mend that and resume the run"
+            ) from error
+        finally:
+            writer.abandon()
     return Run(folder)
 
 
-def _refuse_unusable(folder: Path) -> None:
-    """Refuse a folder that holds a run or cannot be written or made."""
-    if (folder / FILE_NAME).exists():
+def _refuse_unusable(folder: Path, resume: bool) -> None:
+    """Refuse a folder that cannot be written or made, and one that holds a run or, to resume, does not."""
+    path = folder / FILE_NAME
+    found = [place.name for place in (path, twin_of(path), folder / checkpoint.FOLDER_NAME) if place.exists()]
+    if found and not resume:
         raise InvalidInput(
-            "out", str(folder), f"must not hold a run, but has a {FILE_NAME}", "choose another or remove it"
+            "out",
+            str(folder),
+            f"must not hold a run, but has {found[0]}",
+            "choose another, remove it, or resume that run",
         )
-    existing = next(path for path in [folder, *folder.absolute().parents] if path.exists())
+    if resume and FILE_NAME not in found and twin_of(path).name not in found:
+        raise InvalidInput("out", str(folder), f"must hold a run to resume, but has no {FILE_NAME}")
+    existing = next(place for place in [folder, *folder.absolute().parents] if place.exists())
     if not existing.is_dir():
         raise InvalidInput(
             "out", str(folder), f"must be a folder, but {existing} is a file", "choose another"
@@ -138,55 +172,154 @@ def _unwritable(folder: Path, error: OSError) -> InvalidInput:
     return InvalidInput("out", str(folder), f"must be writable: {error}", "choose another or mend its rights")
 
 
-def _refuse_full_disk(path: Path) -> None:
-    """Stop while the file can still be closed: HDF5 cut off by a full disk cannot be read any more."""
-    free = shutil.disk_usage(path.parent).free
-    if free < DISK_RESERVE:
-        raise SandboilError(f"the disk of {path} is nearly full: {free / 1e6:.0f} MB are left")
+@contextmanager
+def _only_user(folder: Path) -> Iterator[None]:
+    """Make the folder, and refuse it while another run writes into it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+    try:
+        try:
+            # The lock goes with the process, however that ends.
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise InvalidInput(
+                "out",
+                str(folder),
+                f"must be free for this run alone: {error}",
+                "wait for the run that uses it, or stop it",
+            ) from error
+        yield
+    finally:
+        os.close(handle)
 
 
-def _run_stage(simulation: Simulation, writer: Writer, interrupt: Interrupt, bar: Bar) -> None:
+def _earlier(folder: Path, simulation: Simulation) -> tuple[Run, checkpoint.Note | None]:
+    """The run in a folder, and the note of its last good state, which the simulation takes over.
+
+    No note of a complete run, nor of one that was stopped before its first checkpoint: it has to begin anew.
+    """
+    path = folder / FILE_NAME
+    repair(path)
+    earlier = Run(folder)
+    checkpoint.refuse_other_run(folder, simulation.fingerprints, earlier.fingerprints)
+    if earlier.status == "complete":
+        return earlier, None
+    for state in checkpoint.stored(folder):
+        if holds(path, state.note.results):
+            simulation.restore(state.path, state.note.stage)
+            return earlier, state.note
+        told = f"{state.path} is passed over: {path} does not reach it"
+        warnings.warn(told, ResumeWarning, stacklevel=3)
+    if checkpoint.exist(folder):
+        raise InvalidInput(
+            "resume",
+            str(folder),
+            "must have a checkpoint that is sound, and its results up to there",
+            "run the scene from its beginning, into another folder",
+        )
+    told = f"the run in {folder} was stopped before its first checkpoint: it begins anew"
+    warnings.warn(told, ResumeWarning, stacklevel=3)
+    return earlier, None
+
+
+def _start_from(simulation: Simulation, run: Run | str | os.PathLike[str], stage: str) -> None:
+    """Let a simulation begin with the end of a stage of another run."""
+    folder = run.path.parent if isinstance(run, Run) else Path(run)
+    state = checkpoint.at_end_of(folder, stage)
+    checkpoint.refuse_other_start(state, simulation.fingerprints)
+    simulation.restore(state.path, stage)
+
+
+def _run_stages(
+    simulation: Simulation,
+    writer: Writer,
+    keeper: checkpoint.Keeper,
+    entry: checkpoint.Note | None,
+    interrupt: Interrupt,
+    bar: Bar,
+) -> None:
+    """Run the stages from where the simulation stands, and close the results.
+
+    `entry` is the note of the state that a run is resumed from.
+    """
+    names = simulation.scene.stage_names
+    present = names.index(simulation.stage)
+    try:
+        for name in names[present + 1 :] if entry is not None and entry.is_end else names[present:]:
+            if name != simulation.stage:
+                simulation.begin_next_stage()
+                entry = None
+            _run_stage(simulation, writer, keeper, entry, interrupt, bar)
+    except RunInterrupted as error:
+        writer.close("interrupted", str(error))
+        raise
+    except SandboilError as error:
+        writer.close("stopped", str(error))
+        raise
+    writer.close("complete")
+
+
+def _run_stage(
+    simulation: Simulation,
+    writer: Writer,
+    keeper: checkpoint.Keeper,
+    entry: checkpoint.Note | None,
+    interrupt: Interrupt,
+    bar: Bar,
+) -> None:
     """Run the present stage to its end with a frame at its beginning, its end and every field interval.
 
     Gravity has one frame at most: its end, if no stage follows whose beginning would be the same.
     """
     scene = simulation.scene
-    interval = scene.output.field_dt if simulation.duration is not None else math.inf
+    is_timed = simulation.duration is not None
+    interval = scene.output.field_dt if is_timed else math.inf
     is_last = simulation.stage == scene.stage_names[-1]
-    start = time.perf_counter()
+    start = time.perf_counter() - (0.0 if entry is None else entry.wall_time)
 
     def spent() -> float:
         return time.perf_counter() - start
 
-    writer.begin_stage()
     bar.begin(simulation)
-    if simulation.duration is not None:
-        writer.write(spent())
 
     def next_target() -> float:
         # The next multiple that is not within the half step by which one is met.
         return interval * (math.floor((simulation.time + 0.5 * simulation.dt) / interval) + 1.0)
 
-    target = next_target()
+    if entry is None:
+        writer.begin_stage()
+        if is_timed:
+            writer.write(spent())
+        target = next_target()
+    else:
+        target = entry.target
     try:
         while not simulation.stage_is_complete:
             reached = simulation.advance(target, LOOK_INTERVAL)
             bar.update(simulation)
-            if interrupt.asked:
-                raise RunInterrupted(
-                    f"interrupted in {simulation.stage} at {simulation.time:.6g} s; "
-                    "the results up to then are complete"
-                )
             if reached and not simulation.stage_is_complete:
-                _refuse_full_disk(writer.path)
                 writer.write(spent())
                 target = next_target()
+            if interrupt.asked and not simulation.stage_is_complete:
+                keeper.store(writer.mark(), target, spent())
+                raise RunInterrupted(
+                    f"interrupted in {simulation.stage} at {simulation.time:.6g} s; "
+                    "the results up to then are complete, and the run can be resumed"
+                )
+            if keeper.is_due and not simulation.stage_is_complete:
+                keeper.store(writer.mark(), target, spent())
     except SandboilError:
         simulation.finish_histories()
         writer.write(spent())
         raise
-    writer.write(spent(), frame=simulation.duration is not None or is_last)
+    writer.write(spent(), frame=is_timed or is_last)
     writer.end_stage()
+    for stage, hand, fingerprint, record in simulation.take_columns():
+        save_column(writer.path.parent, stage, hand, fingerprint, record)
+    keeper.store(writer.mark(), target, spent(), is_end=True)
 
 
 class Interrupt:

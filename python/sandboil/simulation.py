@@ -6,6 +6,7 @@ import math
 import os
 import warnings
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from . import _core
 from ._errors import InvalidInput, SandboilError, SandboilWarning, nearest_name
+from ._fingerprint import fingerprint
 from .boundaries import Periodic
 from .columns import HANDS, ColumnRecord
 from .columns import INTERVAL as COLUMN_INTERVAL
@@ -33,6 +35,10 @@ MAX_THREADS = 256
 # sample, by a wave of stress rho Vs v: up to this share it is lost in what the shaking itself does. Records
 # that were baseline corrected end far below.
 RESIDUAL_VELOCITY = 0.02
+
+# Names in :attr:`Simulation.fingerprints` beside those of the section's parts.
+STAGE_PREFIX = "stages."
+OUTPUT = "output"
 
 # More steps than any stage makes; the core counts in 64 bits.
 _NO_LIMIT = 2**62
@@ -187,6 +193,7 @@ class Simulation:
         self.doubts = doubts(scene, loaded)
         for doubt in self.doubts:
             warnings.warn(doubt, SandboilWarning, stacklevel=2)
+        self._section = _description(scene, self.particles)
         if scene.seepage is not None and (columns is not None or keep_columns):
             name, value = ("columns", columns) if columns is not None else ("keep_columns", keep_columns)
             raise InvalidInput(name, value, "does not go with a seepage stage: columns follow from its water")
@@ -201,9 +208,8 @@ class Simulation:
         self._grains: _core.Simulation | None = None
         self._columns: list[tuple[str, str, str]] = []
         if scene.seepage is None:
-            section = _description(scene, self.particles)
-            self._columns = self._use_columns(section, columns, keep_columns)
-            self._grains = _core.Simulation(section, threads)
+            self._columns = self._use_columns(self._section, columns, keep_columns)
+            self._grains = _core.Simulation(self._section, threads)
         self._index = -1
         self._begin_next_stage()
 
@@ -287,6 +293,48 @@ class Simulation:
         done = self._present.advance(steps=_NO_LIMIT, until=until, seconds=seconds)
         return done or self._present.time + 0.5 * self.dt >= until
 
+    def store(self, path: str | os.PathLike[str], note: bytes = b"") -> None:
+        """Write all that the simulation is to a file, to go on from by :meth:`restore`, with a note.
+
+        Returns when the disk has it. Raises :class:`OSError` if it cannot.
+        """
+        self._moving.store(path, note)
+
+    @property
+    def can_be_stored(self) -> bool:
+        """Whether the present stage has a state to go on from: seepage is computed anew instead."""
+        return self._grains is not None
+
+    def restore(self, path: str | os.PathLike[str], stage: str) -> None:
+        """Take over a state of this scene stored in a stage; it goes on bit for bit as it would have.
+
+        Raises :class:`DamagedState` for a file that is not as it was written, :class:`InvalidInput` for one
+        of another section or another build, and :class:`OSError`.
+        """
+        index = self.scene.stage_names.index(stage)
+        section = self._section
+        if self._water is not None:
+            self.run_stage()
+            section = self._with_water_of_seepage()
+        self._grains = _core.Simulation.restore(section, path, self._threads)
+        self._index = index
+
+    @cached_property
+    def fingerprints(self) -> dict[str, str]:
+        """What tells this scene from others: of each part of the section, each stage and the output."""
+        stages = (
+            stage.model_dump() if isinstance(stage, (Gravity, Seepage)) else described
+            for stage, described in zip(self.scene.stages, self._stages, strict=True)
+        )
+        return {
+            **{name: fingerprint(said) for name, said in self._section.items()},
+            **{
+                STAGE_PREFIX + name: fingerprint(said)
+                for name, said in zip(self.scene.stage_names, stages, strict=True)
+            },
+            OUTPUT: fingerprint(self.scene.output.model_dump()),
+        }
+
     def begin_next_stage(self) -> None:
         """Leave the present stage as it stands and begin the next one."""
         if self._index + 1 == len(self.scene.stages):
@@ -303,23 +351,25 @@ class Simulation:
         self._index += 1
         stage = self.scene.stages[self._index]
         if isinstance(stage, Seepage):
-            section = _description(self.scene, self.particles)
             conditions = [_condition(self.scene, condition) for condition in stage.conditions]
             pressure = self.particles.pore_pressure0
-            self._water = _core.Seepage(section, pressure, conditions, stage.duration)
+            self._water = _core.Seepage(self._section, pressure, conditions, stage.duration)
             return
         if self._grains is None:
-            assert self._water is not None
-            self.particles = self.particles.with_pore_water(
-                self._water.pore_pressure(), self._water.saturation()
-            )
-            self._grains = _core.Simulation(_description(self.scene, self.particles), self._threads)
+            self._grains = _core.Simulation(self._with_water_of_seepage(), self._threads)
         if isinstance(stage, Gravity):
             self._grains.begin_gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
             return
         shaking = self._stages[self._index]
         assert shaking is not None
         self._grains.begin_shaking(shaking)
+
+    def _with_water_of_seepage(self) -> dict[str, Any]:
+        """The section at rest with the water that its seepage stage has left."""
+        assert self._water is not None
+        pressure, saturation = self._water.pore_pressure(), self._water.saturation()
+        self.particles = self.particles.with_pore_water(pressure, saturation)
+        return _description(self.scene, self.particles)
 
     @property
     def _present(self) -> _core.Simulation | _core.Seepage:

@@ -52,23 +52,27 @@ struct Summed<W> {
     failure: Option<io::Error>,
 }
 
+impl<W> Summed<W> {
+    fn kept<T>(&mut self, outcome: io::Result<T>) -> io::Result<T> {
+        outcome.map_err(|error| {
+            let kind = error.kind();
+            self.failure = Some(error);
+            kind.into()
+        })
+    }
+}
+
 impl<W: Write> Write for Summed<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self.to.write(bytes) {
-            Ok(taken) => {
-                self.sum.update(&bytes[..taken]);
-                Ok(taken)
-            }
-            Err(error) => {
-                let kind = error.kind();
-                self.failure = Some(error);
-                Err(kind.into())
-            }
-        }
+        let outcome = self.to.write(bytes);
+        let taken = self.kept(outcome)?;
+        self.sum.update(&bytes[..taken]);
+        Ok(taken)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.to.flush()
+        let outcome = self.to.flush();
+        self.kept(outcome)
     }
 }
 
@@ -84,17 +88,18 @@ const BUILD: [u8; 4] = match u32::from_str_radix(env!("SANDBOIL_SOURCES"), 16) {
 /// Those of `to`.
 pub fn write(state: &impl Serialize, note: &[u8], to: impl Write) -> io::Result<()> {
     let mut to = Summed { to, sum: Hasher::new(), failure: None };
-    to.write_all(MAGIC)?;
-    to.write_all(&FORMAT_VERSION.to_le_bytes())?;
-    to.write_all(&BUILD)?;
-    to.write_all(&(note.len() as u64).to_le_bytes())?;
-    to.write_all(note)?;
-    if let Err(error) = postcard::to_io(state, &mut to) {
-        return Err(to.failure.unwrap_or_else(|| io::Error::other(error)));
-    }
-    let Summed { mut to, sum, .. } = to;
+    let outcome = write_summed(state, note, &mut to);
+    let Summed { mut to, sum, failure } = to;
+    failure.map_or(outcome, Err)?;
     to.write_all(&sum.finalize().to_le_bytes())?;
     to.flush()
+}
+
+fn write_summed(state: &impl Serialize, note: &[u8], to: &mut impl Write) -> io::Result<()> {
+    for part in [MAGIC, &FORMAT_VERSION.to_le_bytes(), &BUILD, &(note.len() as u64).to_le_bytes(), note] {
+        to.write_all(part)?;
+    }
+    postcard::to_io(state, to).map(|_| ()).map_err(io::Error::other)
 }
 
 /// What stands in the bytes of a state.
@@ -144,5 +149,45 @@ pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, StateError> {
     match postcard::take_from_bytes(state) {
         Ok((state, [])) => Ok(state),
         _ => Err(StateError::Damaged("it does not say what a simulation does")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Takes so many bytes, then fails.
+    struct Full {
+        room: usize,
+        flushes: bool,
+    }
+
+    impl Write for Full {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            if self.room == 0 {
+                return Err(io::Error::other("full"));
+            }
+            let taken = bytes.len().min(self.room);
+            self.room -= taken;
+            Ok(taken)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            if self.flushes { Ok(()) } else { Err(io::Error::other("cannot flush")) }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_told_in_the_words_of_the_writer() {
+        let state = vec![1.0_f64; 100];
+        let mut whole = Vec::new();
+        write(&state, b"note", &mut whole).unwrap();
+        assert_eq!(read::<Vec<f64>>(&whole), Ok(state.clone()));
+        for room in 0..whole.len() {
+            let told = write(&state, b"note", Full { room, flushes: true }).unwrap_err().to_string();
+            assert_eq!(told, "full", "{room}");
+        }
+        let told = write(&state, b"note", Full { room: whole.len(), flushes: false }).unwrap_err();
+        assert_eq!(told.to_string(), "cannot flush");
     }
 }
