@@ -10,7 +10,7 @@ const TORTUOSITY: f64 = 0.5;
 const LEAST_RELATIVE_CONDUCTIVITY: f64 = 1e-6;
 
 /// Retention curve of a soil.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct VanGenuchten {
     /// `a`, 1/m: about the inverse of the capillary rise.
     alpha: f64,

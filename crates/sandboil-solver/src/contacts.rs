@@ -29,7 +29,7 @@ const STEEPEST: f64 = 1.5;
 const COLUMNS_AROUND: usize = 3;
 
 /// Elastic moduli of a stress node, kPa.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Stiffness {
     /// Shear modulus.
     shear: f64,
@@ -48,7 +48,7 @@ impl Stiffness {
 }
 
 /// A contact between two nodes of a column of the lattice.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Contact {
     above: usize,
     below: usize,
@@ -60,7 +60,7 @@ struct Contact {
 
 /// The contacts of a section, each with the stiffness around it when shaking began. Soil that softens afterwards takes
 /// no more energy than it would without `kappa`, so that no wave becomes faster.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Contacts {
     stiffness: Vec<Stiffness>,
     all: Vec<Contact>,

@@ -11,7 +11,7 @@ pub const STRESS_NODES: usize = 2;
 const STRESS_NODE_DISTANCE: f64 = 1.0 / 3.0;
 
 /// Hydraulic conductivity by its principal values, m/s.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Conductivity {
     /// Largest.
     pub major: f64,

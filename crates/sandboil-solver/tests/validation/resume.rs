@@ -15,8 +15,8 @@ use sandboil_soil::{
     total_stress::{Criterion, TotalStress},
 };
 use sandboil_solver::{
-    Diffusion, Gravity, Model, Operators, Rayleigh, Region, Shaking, Simulation, SolverError, StateError,
-    UpgoingWave, Water, state,
+    Conductivity, Diffusion, Gravity, Model, Operators, Rayleigh, Region, Shaking, Simulation, SolverError,
+    StateError, UpgoingWave, Water, state,
 };
 use sandboil_sph::Vec2;
 use std::sync::LazyLock;
@@ -51,7 +51,7 @@ fn soils() -> Vec<Region> {
         Soil::PM4Sand(Box::new(PM4Sand::new(sand, Options::default()).unwrap())),
     ]
     .into_iter()
-    .map(|soil| Region { soil, hydraulic_conductivity: 1e-3, ..elastic(1.0, 1.0) })
+    .map(|soil| Region { soil, hydraulic_conductivity: Conductivity::isotropic(1e-3), ..elastic(1.0, 1.0) })
     .collect()
 }
 
