@@ -311,7 +311,8 @@ def described(condition: Any, time: float) -> str:
     if name is None:
         return str(condition.kind)
     moments, values = zip(*series_of(condition), strict=True)
-    return f"{condition.kind}, {name} {np.interp(time, moments, values):.4g} {_PRESCRIBED[name]}"
+    told = condition.kind if name == condition.kind else f"{condition.kind}, {name}"
+    return f"{told} {np.interp(time, moments, values):.4g} {_PRESCRIBED[name]}"
 
 
 class Seepage(Model):

@@ -191,7 +191,7 @@ def seepage(run: Run) -> Figure:
     axes.grid(visible=False)
     entering = sum(max(inflow, 0.0) for _, inflow in run.discharge)
     when = "steady state" if stage.duration is None else f"after {time:.4g} s"
-    axes.set_title(f"seepage, {when}: {entering:.3g} m$^3$/s per m enter", loc="left", fontsize=9)
+    figure.suptitle(f"seepage, {when}: {entering:.3g} m$^3$/s per m enter", fontsize=9)
     told = "discharges are positive where water comes in"
     figure.legend(loc="outside lower center", ncols=2, fontsize=7, title=told, title_fontsize=7)
     # The layout knows the room that tick labels take only once they have been drawn.
@@ -202,8 +202,10 @@ def seepage(run: Run) -> Figure:
 def _size_of(run: Run, conditions: int) -> tuple[float, float]:
     """Width and height of a picture of the section with a legend of so many conditions, inches."""
     x0, y0, x1, y1 = run.scene.bounds
-    width = 10.0
-    height = float(np.clip(0.85 * width * (y1 - y0) / (x1 - x0), 1.5, width))
+    steepness = (y1 - y0) / (x1 - x0)
+    height = float(np.clip(8.5 * steepness, 1.5, 6.0))
+    # Room for the colour bar, and for the legend below.
+    width = float(np.clip(height / steepness + 1.5, 5.0, 10.0))
     return width, height + 1.3 + 0.1 * conditions
 
 
