@@ -826,7 +826,7 @@ class Scene(Model):
                         f"scene.regions[{i}].retention",
                         None,
                         f"is required of soil above the water table (region {region.name!r})",
-                        "VanGenuchten(alpha=14.5, n=2.68) is a sand; or WaterTable(..., above='dry')",
+                        "VanGenuchten(alpha=7.5, n=1.89) is a sandy loam; or WaterTable(..., above='dry')",
                     )
 
     def _regions_above_water(self) -> list[tuple[int, Region]]:
@@ -990,7 +990,7 @@ class Scene(Model):
                     None,
                     f"is required: region {region.name!r} reaches {region.geometry.bounds[3]:g} m, above the "
                     f"head of {level:g} m",
-                    "VanGenuchten(alpha=14.5, n=2.68) is a sand",
+                    "VanGenuchten(alpha=7.5, n=1.89) is a sandy loam",
                 )
 
     def condition_line(self, condition: Any) -> BaseGeometry:
