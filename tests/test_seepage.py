@@ -143,7 +143,8 @@ def test_ground_above_the_water_table(above: str, tmp_path: Path) -> None:
     total = np.cumsum(weight) - 0.5 * weight
     effective = total - (expected * pressure)[order]
     found = run.field("sigma_v_eff", 0.0, stage="shaking")[order]
-    np.testing.assert_allclose(found[1:-1], effective[1:-1], rtol=0.06, atol=1.5)
+    # The end rows alternate by a few per cent of a row's weight times the depth of the column.
+    np.testing.assert_allclose(found[2:-2], effective[2:-2], rtol=0.02, atol=0.3)
     # Nothing moves when the ground is let go, and nothing presses above the water.
     assert np.abs(run.field("displacement")).max() < 1e-4
     assert np.abs(run.field("excess_pore_pressure")).max() < 1e-6
@@ -159,6 +160,19 @@ def test_seepage_is_the_water_of_what_follows(tmp_path: Path) -> None:
     np.testing.assert_array_equal(run.field("saturation"), alone.field("saturation"))
     assert run.discharge == alone.discharge
     assert np.abs(run.field("excess_pore_pressure")).max() < 1e-6
+
+
+def test_coarse_sand_finds_its_steady_state() -> None:
+    """Its capillary rise, 0.07 m, is far below a spacing: conductivities swing unless followed with care."""
+    embankment = sb.Scene.from_toml(Path(__file__).parents[1] / "examples" / "embankment" / "scene.toml")
+    sand = sb.VanGenuchten(14.5, 2.68, residual_saturation=0.05)
+    regions = tuple(region.model_copy(update={"retention": sand}) for region in embankment.regions)
+    scene = embankment.model_copy(update={"regions": regions, "stages": embankment.stages[:1]})
+    simulation = sb.Simulation(scene)
+    simulation.run_stage()
+    assert simulation.steps < 400
+    flows = [flow for _, flow in simulation.discharge]
+    assert abs(sum(flows)) < 1e-6 * max(flows)
 
 
 def test_full_ground_pays_nothing_for_it() -> None:

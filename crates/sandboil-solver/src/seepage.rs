@@ -47,7 +47,7 @@ const FOLLOWED: f64 = 0.5;
 /// Factor on the share of one that swings.
 const CALMED: f64 = 0.5;
 /// Factor on the share of one that does not.
-const TRUSTED: f64 = 1.2;
+const TRUSTED: f64 = 1.1;
 /// Time over that in which the most permeable soil moves water by a spacing, in which even soil that lets nothing
 /// through keeps its pressure: it makes the equations of such soil solvable.
 const AGES: f64 = 1e9;
@@ -433,8 +433,7 @@ impl Seepage {
     /// Conductivities are those at the start of the step. What is left is monotone in the heads, and two nested Newton
     /// iterations find its solution from anywhere (Casulli and Zanolli 2010, SIAM J. Sci. Comput. 32): the retention
     /// curve is the difference of two curves that steepen as they rise, of which the outer iteration follows one and the
-    /// inner the other.
-    /// A step from which little changes follows the retention curve itself, and needs no nesting.
+    /// inner the other. A step from which little changes follows the retention curve itself, and needs no nesting.
     fn solve(&mut self, dt: f64, end: f64) -> bool {
         let begun = Begun {
             head: self.head.clone(),
@@ -741,8 +740,12 @@ fn conjugate_gradients(
     preconditioner.solve(&mut direction);
     let mut measure = dot(&residual, &direction);
     let wanted = tolerance * tolerance * measure;
-    if measure <= 0.0 {
+    if measure == 0.0 {
         return Some(solution);
+    }
+    // A positive matrix gives nothing else: whatever does not has no solution to trust.
+    if !(measure > 0.0) {
+        return None;
     }
     for _ in 0..most {
         let image = matrix(&direction);
