@@ -162,6 +162,24 @@ def test_seepage_is_the_water_of_what_follows(tmp_path: Path) -> None:
     assert np.abs(run.field("excess_pore_pressure")).max() < 1e-6
 
 
+def test_rain_falls_on_the_horizontal() -> None:
+    """What a slope takes of rain is that of its width in the map, not of its length."""
+    slope = sb.Region(
+        "slope",
+        sb.polygon([(0, 0), (20, 0), (20, 4), (12, 4), (4, 8), (0, 8)]),
+        SAND,
+        hydraulic_conductivity=PERMEABILITY,
+        retention=RETENTION,
+        Gs=2.65,
+        porosity=0.4,
+    )
+    rain = [sb.Rain("surface", rate=1e-7), sb.Head("base", head=1.0)]
+    simulation = sb.Simulation(dam(rain, regions=[slope], water_table=sb.WaterTable(elevation=1.0)))
+    simulation.run_stage()
+    assert simulation.discharge[0][1] == pytest.approx(20.0 * 1e-7, rel=1e-3)
+    assert simulation.discharge[1][1] == pytest.approx(-20.0 * 1e-7, rel=1e-3)
+
+
 def test_coarse_sand_finds_its_steady_state() -> None:
     """Its capillary rise, 0.07 m, is far below a spacing: conductivities swing unless followed with care."""
     embankment = sb.Scene.from_toml(Path(__file__).parents[1] / "examples" / "embankment" / "scene.toml")

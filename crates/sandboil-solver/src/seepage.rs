@@ -284,12 +284,14 @@ impl Seepage {
         let moved = self.head.iter().zip(&before).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
         following.arrived = moved <= STEADY_TOLERANCE * self.spacing;
         for (i, moisture) in self.moisture.iter().enumerate() {
-            let change = moisture.relative_conductivity - following.relative[i];
+            let wanted = moisture.relative_conductivity;
+            following.arrived &= (wanted - following.relative[i]).abs() <= STEADY_CONDUCTIVITY;
+            // Conductivities differ by orders of magnitude: they follow in proportion.
+            let change = (wanted / following.relative[i]).ln();
             let factor = if change * following.change[i] < 0.0 { CALMED } else { TRUSTED };
             following.share[i] = (following.share[i] * factor).min(1.0);
-            following.relative[i] += following.share[i] * change;
+            following.relative[i] *= (following.share[i] * change).exp();
             following.change[i] = change;
-            following.arrived &= change.abs() <= STEADY_CONDUCTIVITY;
         }
         self.following = Some(following);
         self.counters.steps += 1;
@@ -671,7 +673,8 @@ impl Seepage {
             }
             let margin = HYSTERESIS * self.spacing * strength[k];
             let most = demand.inflow * cell.length + if self.holds[k] { margin } else { -margin };
-            let wanted = taken[k] < most;
+            // Where nothing passes the edge a head would shut out what falls on it.
+            let wanted = taken[k] < most && (strength[k] > 0.0 || demand.inflow.is_infinite());
             if wanted != self.holds[k] && switches[k] < MOST_SWITCHES {
                 self.holds[k] = wanted;
                 switches[k] += 1;
