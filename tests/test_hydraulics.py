@@ -373,11 +373,13 @@ def test_the_stages_after_seepage_stand_on_its_water(shaken: Run) -> None:
     assert probe.values[0] == pytest.approx(0.0, abs=0.1)
 
 
-def test_partly_saturated_soil_keeps_its_water_while_it_is_shaken(shaken: Run) -> None:
+def test_partly_saturated_soil_gives_way_while_it_is_shaken(shaken: Run) -> None:
     y = shaken.position[:, 1]
-    np.testing.assert_array_equal(shaken.field("saturation"), shaken.field("saturation", 0.0))
+    before, after = shaken.field("saturation", 0.0), shaken.field("saturation")
+    # Water in pores that hold air moves, a little, and is hardly pressed.
+    assert 0.0 < np.abs(after - before).max() < 1e-3
     excess = np.abs(shaken.field_series("excess_pore_pressure")).max(axis=0)
-    assert (excess[y > 1.25] == 0.0).all()
+    assert excess[y > 1.25].max() < 0.2 * excess[y < 0.75].max()
     assert (excess[y < 0.75] > 0.0).all()
 
 

@@ -313,7 +313,7 @@ def _water_at_rest(scene: Scene, particles: Discretisation) -> tuple[Floats, Flo
     saturation = np.ones(len(y))
     for index, region in enumerate(scene.regions):
         above = (particles.region == index) & (pressure < 0.0)
-        if scene.water_table.above == "dry" and scene.seepage is None:
+        if not scene.holds_suction:
             pressure[above] = saturation[above] = 0.0
         elif region.retention is not None:
             saturation[above] = _core.saturation(

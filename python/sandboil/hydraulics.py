@@ -272,9 +272,8 @@ class Drain(Model):
         return self
 
 
-Condition = Annotated[
-    Head | Pressure | Flux | Rain | Reservoir | SeepageFace | Drain, Field(discriminator="kind")
-]
+AnyCondition = Head | Pressure | Flux | Rain | Reservoir | SeepageFace | Drain
+Condition = Annotated[AnyCondition, Field(discriminator="kind")]
 
 # Conditions that tell the level of the pressure; a flux alone leaves it open.
 REFERENCES = ("head", "pressure", "rain", "reservoir", "seepage-face", "drain")
@@ -305,14 +304,32 @@ def series_of(condition: Model) -> Series:
     return values
 
 
+def value_at(condition: Any, time: float) -> float:
+    """What a condition prescribes at a time (s); 0 if it has no value."""
+    series = series_of(condition)
+    if not series:
+        return 0.0
+    moments, values = zip(*series, strict=True)
+    return float(np.interp(time, moments, values))
+
+
+def frozen(condition: Any, time: float) -> Any:
+    """The condition as it is at a time (s), from then on."""
+    name = prescribed(condition)
+    return (
+        condition
+        if name is None
+        else condition.model_copy(update={name: ((0.0, value_at(condition, time)),)})
+    )
+
+
 def described(condition: Any, time: float) -> str:
     """Kind of a condition and what it prescribes at a time (s), for people."""
     name = prescribed(condition)
     if name is None:
         return str(condition.kind)
-    moments, values = zip(*series_of(condition), strict=True)
     told = condition.kind if name == condition.kind else f"{condition.kind}, {name}"
-    return f"{told} {np.interp(time, moments, values):.4g} {_PRESCRIBED[name]}"
+    return f"{told} {value_at(condition, time):.4g} {_PRESCRIBED[name]}"
 
 
 class Seepage(Model):
@@ -333,7 +350,7 @@ class Seepage(Model):
 
         def __init__(
             self,
-            conditions: Sequence[Head | Pressure | Flux | Rain | Reservoir | SeepageFace | Drain],
+            conditions: Sequence[AnyCondition],
             *,
             duration: float | None = None,
         ) -> None: ...

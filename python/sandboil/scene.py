@@ -33,16 +33,21 @@ from .boundaries import (
 )
 from .hydraulics import (
     REFERENCES,
+    AnyCondition,
     AnyConductivity,
+    Condition,
     Conductivity,
     Drain,
     Pressure,
     Seepage,
     SeepageFace,
     VanGenuchten,
+    described,
+    frozen,
     heads_of,
     prescribed,
     series_of,
+    value_at,
 )
 from .materials import Elastic, Material, PM4Sand, Positive
 from .outline import Outline
@@ -451,6 +456,10 @@ class Shaking(Model):
     the motion and of its way along the base unless given; a longer one adds quiet time. `vertical` is the
     vertical component of the same record (same kind and spacing), positive upwards; the base then absorbs
     vertically too. `rayleigh` damps beside the soil's own hysteresis.
+
+    `conditions` are those of the water while the ground moves, with time counted from the stage's beginning.
+    Left out, those that held before go on as they last were; an empty list ends them all. Edges without one
+    are impermeable, save the ground surface, which keeps its pressure. Lines go with the ground.
     """
 
     _label: ClassVar[str] = "stage"
@@ -462,6 +471,7 @@ class Shaking(Model):
     base: CompliantBase = CompliantBase()
     duration: Positive | None = Field(default=None, description="s")
     rayleigh: Rayleigh | None = None
+    conditions: Many[Condition] | None = Field(default=None, description="left out: as before")
 
     if TYPE_CHECKING:
 
@@ -473,6 +483,7 @@ class Shaking(Model):
             base: CompliantBase = ...,
             duration: float | None = None,
             rayleigh: Rayleigh | None = None,
+            conditions: Sequence[AnyCondition] | None = None,
         ) -> None: ...
 
     @model_validator(mode="after")
@@ -662,6 +673,7 @@ class Scene(Model):
         self._check_spacing()
         self._check_water()
         self._check_seepage()
+        self._check_moving_water()
         self._check_densities()
         self._check_materials()
         self._check_stages()
@@ -879,7 +891,111 @@ class Scene(Model):
             self._check_shared_edges(stage, path)
             self._check_desaturation(stage, path)
 
-    def _check_condition(self, stage: Seepage, condition: Any, path: str) -> None:
+    def _check_moving_water(self) -> None:
+        """Conditions of the stages in which the ground moves."""
+        for i, stage in enumerate(self.stages):
+            if not isinstance(stage, Shaking) or not stage.conditions:
+                continue
+            path = f"scene.stages[{i}].conditions"
+            kinds = [condition.kind for condition in stage.conditions]
+            if self.water is None:
+                raise InvalidInput(
+                    path, kinds, "go with water, of which the scene has none", "water = Water()"
+                )
+            if not any(region.conductivity[0] for region in self.regions):
+                raise InvalidInput(
+                    path,
+                    kinds,
+                    "need soil that water flows through",
+                    "hydraulic_conductivity = 1e-5 (m/s) is a fine sand",
+                )
+            for k, condition in enumerate(stage.conditions):
+                self._check_condition(stage, condition, f"{path}[{k}]")
+                self._check_beside_columns(condition, f"{path}[{k}]")
+                self._check_flooded(condition, f"{path}[{k}]")
+            self._check_shared_edges(stage, f"scene.stages[{i}]")
+
+    def _check_flooded(self, condition: Any, path: str) -> None:
+        """Soil that is dry at rest takes no water: it has no retention curve to tell how."""
+        if not self.is_partly_saturated or self.holds_suction or isinstance(condition, Drain | SeepageFace):
+            return
+        line = shapely.segmentize(self.condition_line(condition), self.spacing)
+        x, y = shapely.get_coordinates(line).T
+        dry = y > self.water_level_at(x) + COORDINATE_TOLERANCE
+        told = heads_of(condition)
+        comes = np.inf if told is None else max(value for _, value in told[1])
+        if (dry & (y < comes)).any():
+            raise InvalidInput(
+                path,
+                described(condition, 0.0),
+                "must not bring water to soil that is dry above the water table",
+                "WaterTable(..., above='retention') and a retention curve for the soil",
+            )
+
+    def _check_beside_columns(self, condition: Any, path: str) -> None:
+        """Free-field columns know no conditions of their own."""
+        if "free-field" not in self.side_kinds or isinstance(condition, Drain):
+            return
+        line = self.condition_line(condition)
+        if self._is_beside_column(line):
+            raise InvalidInput(
+                f"{path}.on",
+                condition.on,
+                "must not be a free-field side, whose column tells the water there",
+                "leave the condition out",
+            )
+        on_surface = line.distance(shapely.LineString(self.outline.surface)) <= COORDINATE_TOLERANCE
+        if on_surface and (len(series_of(condition)) > 1 or self._value_at_rest(condition) is None):
+            name = prescribed(condition) or "on"
+            raise InvalidInput(
+                f"{path}.{name}",
+                getattr(condition, name),
+                "must stay on the surface what it was in the seepage stage, beside free-field sides: their "
+                "columns keep the water they have",
+                "sides = Roller(), far away",
+            )
+
+    def _is_beside_column(self, line: BaseGeometry) -> bool:
+        x = line.bounds[0::2]
+        ends = [
+            end for kind, end in zip(self.side_kinds, self.bounds[0::2], strict=True) if kind == "free-field"
+        ]
+        return any(np.allclose(x, end, atol=COORDINATE_TOLERANCE, rtol=0.0) for end in ends)
+
+    def _value_at_rest(self, condition: Any) -> float | None:
+        """What a condition prescribed at the end of seepage (0 for nothing); None if it did not hold."""
+        if self.seepage is None:
+            return None
+        line = self.condition_line(condition)
+        for before in self.seepage.conditions:
+            if before.kind == condition.kind and self.condition_line(before).equals(line):
+                return value_at(before, self.seepage.duration or 0.0)
+        return None
+
+    def moving_conditions(self, stage: Shaking) -> list[tuple[Any, float | None]]:
+        """Conditions of the water in a shaking stage, and what each prescribed at rest if it held there.
+
+        Where the stage leaves them to those before, these stay as they last were, save on free-field sides.
+        """
+        current = [
+            (condition, self._value_at_rest(condition))
+            for condition in (self.seepage.conditions if self.seepage else ())
+            if not self._is_beside_column(self.condition_line(condition))
+        ]
+        end = self.seepage.duration if self.seepage else None
+        for before in self.stages:
+            if not isinstance(before, Shaking):
+                continue
+            if before.conditions is None:
+                current = [(frozen(condition, end or 0.0), rest) for condition, rest in current]
+            else:
+                current = [(condition, self._value_at_rest(condition)) for condition in before.conditions]
+            if before is stage:
+                break
+            end = self.duration(before)
+        return current
+
+    def _check_condition(self, stage: Seepage | Shaking, condition: Any, path: str) -> None:
         line = self.condition_line(condition)
         if isinstance(condition, Drain):
             if not shapely.buffer(self.section, COORDINATE_TOLERANCE).covers(line):
@@ -918,7 +1034,7 @@ class Scene(Model):
                         "heads are elevations in the section's own coordinates",
                     )
         values = series_of(condition)
-        if stage.duration is None and len(values) > 1:
+        if isinstance(stage, Seepage) and stage.duration is None and len(values) > 1:
             raise InvalidInput(
                 f"{path}.{prescribed(condition)}",
                 values,
@@ -953,9 +1069,9 @@ class Scene(Model):
                 hint,
             )
 
-    def _check_shared_edges(self, stage: Seepage, path: str) -> None:
+    def _check_shared_edges(self, stage: Seepage | Shaking, path: str) -> None:
         """No stretch of edge may obey two conditions."""
-        edges = [(k, c) for k, c in enumerate(stage.conditions) if not isinstance(c, Drain)]
+        edges = [(k, c) for k, c in enumerate(stage.conditions or ()) if not isinstance(c, Drain)]
         for (k, one), (m, other) in itertools.combinations(edges, 2):
             reach = shapely.buffer(self.condition_line(one), COORDINATE_TOLERANCE)
             common = self.condition_line(other).intersection(reach)
@@ -1238,6 +1354,11 @@ class Scene(Model):
     def is_at_rest(self) -> bool:
         """Whether water is all that moves: no stage looks at the grains."""
         return len(self.stages) == 1 and self.seepage is not None
+
+    @property
+    def holds_suction(self) -> bool:
+        """Whether soil above the water table holds water by its retention curve, or is dry."""
+        return self.seepage is not None or (self.water_table is not None and self.water_table.above != "dry")
 
     @property
     def is_partly_saturated(self) -> bool:

@@ -473,8 +473,10 @@ class Simulation:
             values["excess_pore_pressure"] = excess
             values["pore_pressure"] = particles.pore_pressure0 + excess
             values["r_u"] = pore_pressure_ratio(excess, particles.sigma_v_eff0)
-        full = particles.saturation0
-        values["saturation"] = np.ones(len(sigma_v)) if full is None else full
+        moved = core.saturation()
+        values["saturation"] = next(
+            (found for found in (moved, particles.saturation0) if found is not None), np.ones(len(sigma_v))
+        )
         return {name: np.ascontiguousarray(values[name]) for name in names}
 
     def envelope(self, name: str) -> Floats | None:
@@ -791,6 +793,12 @@ def _shaking_description(
         "sides": (left, right),
         "column_records": (None, None),
         "record_columns": None,
+        "conditions": [
+            _condition(scene, condition) | {"at_rest": at_rest}
+            for condition, at_rest in scene.moving_conditions(stage)
+        ]
+        if scene.water is not None
+        else [],
         "local_damping": scene.numerics.local_damping,
         "rayleigh": None if rayleigh is None else (rayleigh.ratio, rayleigh.frequencies),
         "time_step_factor": scene.numerics.time_step_factor,
@@ -823,7 +831,7 @@ def _region(scene: Scene, region: Region) -> dict[str, Any]:
         "porosity": soil.porosity,
         "solid_density": soil.solid_density,
         "hydraulic_conductivity": region.conductivity,
-        "retention": None if region.retention is None else region.retention.core,
+        "retention": region.retention.core if region.retention and scene.holds_suction else None,
         "earth_pressure_coefficient": region.K0,
         "static_poisson_ratio": region.initial_poisson_ratio if poisson is None else poisson,
     }

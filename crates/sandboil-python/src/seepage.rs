@@ -14,7 +14,7 @@ fn series(dict: &Bound<'_, PyDict>) -> PyResult<solver::Series> {
     Ok(solver::Series { time, value })
 }
 
-fn boundary(dict: &Bound<'_, PyDict>) -> PyResult<solver::HydraulicBoundary> {
+pub fn boundary(dict: &Bound<'_, PyDict>) -> PyResult<solver::HydraulicBoundary> {
     let condition = match get::<String>(dict, "kind")?.as_str() {
         "head" => solver::HydraulicCondition::Head(series(dict)?),
         "pressure" => solver::HydraulicCondition::Pressure(series(dict)?),

@@ -3,6 +3,7 @@
 use crate::{
     errors::{CoreError, state_error},
     material::{integrator, retention, soil},
+    seepage::boundary,
 };
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, ToPyArray, ndarray::Array};
 use pyo3::{
@@ -120,6 +121,10 @@ fn outline(dict: &Bound<'_, PyDict>) -> PyResult<solver::Outline> {
         base_support: one_of("base_support", &get::<String>(dict, "base_support")?, &SUPPORTS)?,
         sides: [left?, right?],
     })
+}
+
+fn moving_boundary(dict: &Bound<'_, PyDict>) -> PyResult<solver::MovingBoundary> {
+    Ok(solver::MovingBoundary { boundary: boundary(dict)?, at_rest: get(dict, "at_rest")? })
 }
 
 /// Interval, horizontal and vertical velocities of an upgoing wave.
@@ -296,6 +301,10 @@ impl Simulation {
                 .unwrap_or(solver::SHAKING_FACTOR),
             probes: vectors(&get(stage, "probes")?),
             history_interval: get(stage, "history_interval")?,
+            conditions: get::<Vec<Bound<'_, PyDict>>>(stage, "conditions")?
+                .iter()
+                .map(moving_boundary)
+                .collect::<PyResult<_>>()?,
             stress_histories: get(stage, "stress_histories")?,
             pressure_envelope: get(stage, "pressure_envelope")?,
             strain_envelope: get(stage, "strain_envelope")?,
@@ -399,6 +408,11 @@ impl Simulation {
 
     fn excess_pore_pressure<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         self.inner.excess_pore_pressure().map(|values| values.to_pyarray(py))
+    }
+
+    /// Degree of saturation (n,); None where it cannot change.
+    fn saturation<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.inner.saturation().map(|values| values.to_pyarray(py))
     }
 
     fn largest_excess_pore_pressure<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {

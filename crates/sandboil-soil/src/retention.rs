@@ -21,7 +21,7 @@ pub struct VanGenuchten {
 }
 
 /// What a soil holds and lets through at a pressure head.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Moisture {
     /// Degree of saturation `S_r`.
     pub saturation: f64,

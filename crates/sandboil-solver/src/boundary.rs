@@ -290,7 +290,7 @@ impl Image {
 }
 
 /// Where an image is seen across an edge.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Crossing {
     /// Point of the edge, m.
     pub foot: Vec2,

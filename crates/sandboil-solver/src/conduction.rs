@@ -21,7 +21,7 @@ use sandboil_sph::{
 };
 
 /// Exchange of water between the nodes of a section, and with what stands beyond its edges.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Conduction {
     /// Inflow of a node from another per metre of head, m/s: symmetric.
     pairs: Csr<f64>,
@@ -32,7 +32,7 @@ pub struct Conduction {
 }
 
 /// A node and an image that it sees.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Beyond {
     /// The node that sees.
     pub node: u32,
@@ -48,8 +48,17 @@ pub struct Beyond {
     pub at_surface: bool,
 }
 
+/// What a node sees of the head beyond an edge: `sign` times that of the pair's owner, exchanged by `strength`, m/s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Across {
+    /// Exchange, m/s.
+    pub strength: f64,
+    /// 1 where nothing crosses the edge, -1 where a head stands on it.
+    pub sign: f64,
+}
+
 /// Conduction along the major direction at stress nodes, beyond the isotropic part.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Along {
     /// `V (k_major - k_minor)` of each stress node, m3/s per m.
     strength: Vec<f64>,
@@ -212,30 +221,36 @@ impl Conduction {
         self.along.is_some()
     }
 
-    /// The same as entries of a matrix, in saturated soil.
-    fn add_along(&self, rows: &mut Rows) {
+    /// The same as entries of a matrix.
+    fn add_along(&self, of_point: impl Fn(usize) -> f64, rows: &mut Rows) {
         let Some(Along { strength, derivative }) = &self.along else { return };
         for (j, row) in rows.iter_mut().enumerate() {
             for (s, own) in derivative.transposed.iter_row(j) {
-                let scale = -strength[s] * own;
+                let scale = -strength[s] * of_point(s) * own;
                 row.extend(derivative.forward.iter_row(s).map(|(k, w)| (id(k), scale * w)));
             }
         }
     }
 
-    /// The whole exchange of saturated soil, m/s. Where `is_open` the head beyond an edge is zero on the edge, elsewhere
-    /// nothing crosses it.
-    pub fn saturated(&self, is_open: impl Fn(&Beyond) -> bool) -> Csr<f64> {
-        let mut rows = self.pair_rows(|_, _| 1.0);
-        self.add_along(&mut rows);
-        for pair in &self.beyond {
-            let (exchange, shown) = if is_open(pair) { (pair.open, -1.0) } else { (pair.closed, 1.0) };
+    /// The whole exchange of soil with the relative conductivities of its nodes, m/s; none: saturated. `across` tells what
+    /// is seen beyond the edges, by the index of [`Conduction::beyond`].
+    pub fn exchange(&self, relative: Option<&[f64]>, across: impl Fn(usize) -> Across) -> Csr<f64> {
+        let mut rows = self.pair_rows(|i, j| relative.map_or(1.0, |relative| between(relative, i, j)));
+        self.add_along(|s| relative.map_or(1.0, |relative| relative[s / STRESS_NODES]), &mut rows);
+        for (k, pair) in self.beyond.iter().enumerate() {
+            let Across { strength, sign } = across(k);
             let row = &mut rows[pair.node as usize];
-            row.push((pair.owner, shown * exchange));
-            row.push((pair.node, -exchange));
+            row.push((pair.owner, sign * strength));
+            row.push((pair.node, -strength));
         }
         collected(rows)
     }
+}
+
+/// Relative conductivity between two nodes: their mean, which places a wetting front within a spacing, where that of
+/// the wetter one lets it run ahead.
+pub fn between(relative: &[f64], i: usize, j: usize) -> f64 {
+    0.5 * (relative[i] + relative[j])
 }
 
 /// Places on the way between two nodes at which the soil is looked up: on a lattice they measure the parts of the way on
@@ -246,8 +261,12 @@ const SAME_COLUMN: f64 = 0.5;
 
 /// Nodes and images as they are, and all of them once more beyond the ground surface.
 fn with_surface(model: &Model, around: &Surroundings, points: &[Vec2], reach: f64) -> Surroundings {
-    let mut profile: Vec<Vec2> =
-        points.iter().zip(&model.surface_elevation).map(|(at, &top)| Vec2::new(at.x, top)).collect();
+    // The ground goes with the uppermost node of each column.
+    let mut profile: Vec<Vec2> = (0..points.len())
+        .map(|node| (points[node], model.surface_elevation[node], model.position[node]))
+        .filter(|(_, top, start)| top - start.y < model.spacing.y)
+        .map(|(at, top, start)| Vec2::new(at.x, top + (at.y - start.y)))
+        .collect();
     profile.sort_by(|a, b| a.x.total_cmp(&b.x).then(b.y.total_cmp(&a.y)));
     // One point for each column of the lattice: between them the ground is straight.
     profile.dedup_by(|next, kept| next.x - kept.x < SAME_COLUMN * model.spacing.x);

@@ -1,17 +1,21 @@
-//! Pore pressure of the single-layer u-p formulation (Eq. 3, discretised by Eq. 7), saturated.
+//! Pore pressure of the single-layer u-p formulation (Eq. 3, discretised by Eq. 7).
 //!
 //! The unknown is the excess over the pressure at the start of the stage, in kPa: its reference is carried by
 //! the constant nodal forces, and only the increments meet the transposed operators.
 
 use crate::{
     banded::BandedLu,
-    boundary::id,
+    boundary::{Outline, Walls, id},
+    conduction::Conduction,
     deformation::{Cofactor, Deformation},
-    geometry::FlowTables,
+    error::SolverError,
+    geometry::{FlowTables, Geometry, conduction},
     model::{Model, STRESS_NODES, Water},
     parallel::{Rows, chunks, for_each_chunk},
     phases::Phases,
     skeleton::StressPoint,
+    water_edges::{MovingBoundary, WaterEdges, open_surface},
+    wetting::Wetting,
 };
 use sandboil_sph::{Csr, Mat2, Vec2};
 
@@ -25,11 +29,38 @@ struct SurfaceNode {
     fraction: f64,
 }
 
+/// The section where it now stands.
+#[derive(Clone, Copy)]
+pub struct Ground<'a> {
+    /// The model.
+    pub model: &'a Model,
+    /// Volumes and porosities.
+    pub phases: &'a Phases,
+    /// Weights at the present place.
+    pub geometry: &'a Geometry,
+    /// Present places of the nodes, m.
+    pub position: &'a [Vec2],
+    /// The edges, and what they are.
+    pub edges: (&'a Outline, Walls),
+}
+
+impl Ground<'_> {
+    fn conduction(&self) -> Conduction {
+        conduction(self.model, self.geometry, self.position, self.phases.volume(), self.edges)
+    }
+
+    fn drains(&self) -> bool {
+        self.model.regions.iter().any(|region| region.hydraulic_conductivity.major > 0.0)
+    }
+}
+
 /// Excess pore pressure and what moves it.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Flow {
     /// Excess pore pressure at velocity nodes, kPa, compression positive.
-    pub excess: Vec<f64>,
+    excess: Vec<f64>,
+    /// Pressure beyond that at rest that the grains feel, kPa: at a node tied to the surface what stands on that.
+    felt: Vec<f64>,
     /// `J F^-T` at velocity nodes: the mean deformation of their stress nodes.
     cofactor: Vec<Cofactor>,
     /// `K_f / n`: pressure rise per unit of volume strain, kPa.
@@ -40,6 +71,11 @@ pub struct Flow {
     surface: Vec<SurfaceNode>,
     /// Share of each node's excess pressure in the force: none of a node tied to the surface, all of the others.
     push: Vec<f64>,
+    /// `div (k grad H)` at velocity nodes, 1/s per m of head (Eq. 3); none if undrained.
+    diffusion: Option<Csr<f64>>,
+    inverse_volume: Vec<f64>,
+    edges: Option<WaterEdges>,
+    wetting: Option<Wetting>,
     scheme: Scheme,
     right_hand_side: Vec<f64>,
 }
@@ -72,12 +108,32 @@ pub enum FlowScheme {
 }
 
 impl Flow {
-    /// Zero excess pressure everywhere.
-    pub fn new(model: &Model, phases: &Phases, scheme: FlowScheme) -> Option<Self> {
-        let water = model.water?;
+    /// Zero excess pressure everywhere; none in a dry section.
+    ///
+    /// # Errors
+    /// Conditions that no node is near.
+    pub fn new(
+        ground: Ground,
+        scheme: FlowScheme,
+        conditions: &[MovingBoundary],
+    ) -> Result<Option<Self>, SolverError> {
+        let Ground { model, phases, .. } = ground;
+        let Some(water) = model.water else { return Ok(None) };
         let conductivity = |node: usize| model.regions[model.region[node] as usize].hydraulic_conductivity;
+        let wetting = Wetting::new(model, phases, !conditions.is_empty());
+        let drained = scheme != FlowScheme::Undrained;
+        let edges = if drained && (wetting.is_some() || !conditions.is_empty()) {
+            // Conditions lie on the edges as they were drawn.
+            let drawn = (&model.outline, ground.edges.1);
+            let tables = conduction(model, ground.geometry, &model.position, &model.volume, drawn);
+            Some(WaterEdges::new(model, water, &tables, conditions)?)
+        } else {
+            None
+        };
         let drains = |tie: &SurfaceNode| conductivity(tie.node as usize).major > 0.0;
-        let surface: Vec<SurfaceNode> = surface_nodes(model, water).into_iter().filter(drains).collect();
+        let is_sealed = |tie: &SurfaceNode| edges.as_ref().is_some_and(|edges| edges.seals(tie.node));
+        let surface: Vec<SurfaceNode> =
+            surface_nodes(model, water).into_iter().filter(|tie| drains(tie) && !is_sealed(tie)).collect();
         // Only the acceleration term reads them.
         let mobility = if scheme == FlowScheme::ExplicitWithAcceleration {
             (0..model.nodes()).map(|node| conductivity(node).tensor() / model.gravity).collect()
@@ -88,14 +144,19 @@ impl Flow {
         for tie in &surface {
             push[tie.node as usize] = 0.0;
         }
-        Some(Self {
+        let mut flow = Self {
             excess: vec![0.0; model.nodes()],
+            felt: vec![0.0; model.nodes()],
             cofactor: vec![Deformation::default().cofactor(); model.nodes()],
             stiffness: (0..model.nodes()).map(|node| stiffness(model, phases, node)).collect(),
             mobility,
             unit_weight: water.unit_weight,
             surface,
             push,
+            diffusion: None,
+            inverse_volume: Vec::new(),
+            edges,
+            wetting,
             scheme: match scheme {
                 FlowScheme::Undrained => Scheme::Undrained,
                 FlowScheme::Explicit => Scheme::Explicit { acceleration_term: false },
@@ -103,18 +164,106 @@ impl Flow {
                 FlowScheme::Implicit => Scheme::Implicit { factors: None },
             },
             right_hand_side: vec![0.0; model.nodes()],
-        })
+        };
+        flow.follow(ground, 0.0);
+        Ok(Some(flow))
     }
 
-    /// Takes over the porosities and forgets factors made for another geometry.
-    pub fn geometry_changed(&mut self, model: &Model, phases: &Phases) {
+    /// Takes over the porosities and forgets factors made for another geometry. `time` of the stage, s.
+    pub fn follow(&mut self, ground: Ground, time: f64) {
+        let Ground { model, phases, position, .. } = ground;
         for (node, stiffness) in self.stiffness.iter_mut().enumerate() {
             *stiffness = self::stiffness(model, phases, node);
         }
         self.cofactor.fill(Deformation::default().cofactor());
+        self.inverse_volume = phases.volume().iter().map(|volume| volume.recip()).collect();
+        if let Some(wetting) = &mut self.wetting {
+            wetting.follow(phases);
+            wetting.update(false, &self.excess, &mut self.stiffness);
+        }
+        if matches!(self.scheme, Scheme::Undrained) || !ground.drains() {
+            return;
+        }
+        let conduction = ground.conduction();
+        if let Some(edges) = &mut self.edges {
+            let displacement = |node: u32| position[node as usize] - model.position[node as usize];
+            edges.follow(&conduction, displacement);
+        }
+        self.switch(model, time);
+        self.tabulate(model, &conduction, time);
+        if let Some(wetting) = &mut self.wetting {
+            wetting.conduction = Some(conduction);
+        }
+    }
+
+    /// Makes the tables of diffusion anew where conductivities or conditions have left them. Full soil keeps both.
+    pub fn refresh(&mut self, model: &Model, time: f64) {
+        let Some(wetting) = &mut self.wetting else { return };
+        let Some(conduction) = wetting.conduction.take() else { return };
+        let is_stale = wetting.is_stale();
+        if self.switch(model, time) || is_stale {
+            self.tabulate(model, &conduction, time);
+        }
+        if let Some(wetting) = &mut self.wetting {
+            wetting.conduction = Some(conduction);
+        }
+    }
+
+    /// Lets conditions hold and go by the present heads. Returns whether one did.
+    fn switch(&mut self, model: &Model, time: f64) -> bool {
+        let Some(edges) = &mut self.edges else { return false };
+        edges.switch(time, &|node| head(model, &self.excess, self.unit_weight, node))
+    }
+
+    /// The table of diffusion for the present conditions and conductivities.
+    fn tabulate(&mut self, model: &Model, conduction: &Conduction, time: f64) {
         if let Scheme::Implicit { factors } = &mut self.scheme {
             *factors = None;
         }
+        let mut table = match &mut self.edges {
+            None => conduction.exchange(None, open_surface(conduction)),
+            Some(edges) => {
+                let head = |node: usize| {
+                    model.position[node].y
+                        + (model.pore_pressure[node] + self.excess[node]) / self.unit_weight
+                };
+                edges.switch(time, &head);
+                edges.look_up(time);
+                let moisture = self.wetting.as_mut().map(Wetting::tabled);
+                let relative = moisture.as_ref().map(|all| all.each_ref().map(Vec::as_slice));
+                let (table, gained) = edges.tables(model, conduction, &self.inverse_volume, relative, &head);
+                if let (Some(wetting), Some(gained)) = (&mut self.wetting, gained) {
+                    wetting.inflow = gained.iter().zip(&self.inverse_volume).map(|(q, v)| q * v).collect();
+                }
+                table
+            }
+        };
+        table.scale_by_row(&self.inverse_volume);
+        self.diffusion = Some(table);
+    }
+
+    /// Excess pore pressure at velocity nodes, kPa, compression positive.
+    pub fn excess(&self) -> &[f64] {
+        &self.excess
+    }
+
+    /// Changes the excess pressures, kPa.
+    pub fn set_excess(&mut self, change: impl FnOnce(&mut [f64])) {
+        change(&mut self.excess);
+        if let Some(wetting) = &mut self.wetting {
+            wetting.update(false, &self.excess, &mut self.stiffness);
+        }
+        self.feel();
+    }
+
+    /// Total stress that water carries beyond that at rest in a node, kPa.
+    pub fn neutral(&self, i: usize) -> f64 {
+        self.wetting.as_ref().map_or(self.excess[i], |wetting| wetting.neutral(i, self.excess[i]))
+    }
+
+    /// Degree of saturation of a node, if it can change.
+    pub fn saturation(&self) -> Option<impl Fn(usize) -> f64> {
+        self.wetting.as_ref().map(|wetting| |node| wetting.saturation(node))
     }
 
     /// The scheme in the user's words.
@@ -133,26 +282,38 @@ impl Flow {
             Scheme::Implicit { factors: Some((_, lu)) } => lu.bytes(),
             _ => 0,
         };
-        4 * size_of_val(self.excess.as_slice())
+        6 * size_of_val(self.excess.as_slice())
             + size_of_val(self.mobility.as_slice())
             + size_of_val(self.cofactor.as_slice())
+            + self.diffusion.as_ref().map_or(0, Csr::bytes)
+            + self.edges.as_ref().map_or(0, WaterEdges::bytes)
+            + self.wetting.as_ref().map_or(0, Wetting::bytes)
             + factors
     }
 
-    /// Nominal excess pressure `q J F^-T` of node `i`, kPa.
+    /// Nominal pressure beyond that at rest, `q J F^-T`, of node `i`, kPa.
     pub fn nominal(&self, i: usize) -> [f64; 4] {
-        self.cofactor[i].scaled(self.excess[i] * self.push[i])
+        self.cofactor[i].scaled(self.felt[i])
     }
 
-    /// Force of the excess pressure on node `j`, kN/m: the exact transpose of the divergence.
+    /// Force of the water on node `j` beyond that at rest, kN/m: the exact transpose of the divergence, what stands on the
+    /// ground surface against it, and the weight of water gained.
     #[inline]
     pub fn force(&self, tables: &FlowTables, j: usize) -> Vec2 {
         let row = tables.divergence.transposed.iter_row(j);
-        row.map(|(i, weight)| self.cofactor[i].carry(*weight) * (self.excess[i] * self.push[i])).sum()
+        let Some(edges) = &self.edges else {
+            return row.map(|(i, weight)| self.cofactor[i].carry(*weight) * self.felt[i]).sum();
+        };
+        // What stands on the surface presses from outside: uniform pressure, inside and out, moves nothing.
+        let outside = edges.at_surface(j);
+        let force: Vec2 =
+            row.map(|(i, weight)| self.cofactor[i].carry(*weight) * (self.felt[i] - outside)).sum();
+        let weight = self.wetting.as_ref().map_or(0.0, |wetting| wetting.gained_weight(j));
+        force - Vec2::new(0.0, weight)
     }
 
     /// Advances the excess pressure by one step from the velocity field at its middle (Eq. 7) and the deformation of
-    /// the stress nodes at its end.
+    /// the stress nodes at its end, the moment `end` of the stage, s.
     ///
     /// Returns `false` when the implicit matrix cannot be factored (not finite).
     #[must_use]
@@ -161,15 +322,20 @@ impl Flow {
         threaded: bool,
         tables: &FlowTables,
         points: &[StressPoint],
-        velocity: &[Vec2],
-        acceleration: &[Vec2],
-        dt: f64,
+        (velocity, acceleration): (&[Vec2], &[Vec2]),
+        (end, dt): (f64, f64),
     ) -> bool {
         let divergence = &tables.divergence.forward;
+        if let Some(edges) = &mut self.edges {
+            edges.look_up(end);
+        }
         // Slices of nothing, which take no memory: the loops below write one array or two.
         let mut unit = vec![(); self.excess.len()];
         let mut results = vec![(); chunks(self.excess.len())];
         let (excess, stiffness) = (&self.excess, &self.stiffness);
+        let (edges, wetting) = (self.edges.as_ref(), self.wetting.as_ref());
+        // Nothing flows between nodes: no condition is felt either.
+        let flows = self.diffusion.is_some();
         let rows = Rows { a: &mut self.right_hand_side, b: &mut self.cofactor, c: &mut unit };
         for_each_chunk(threaded, rows, &mut results, |first, rows, ()| {
             for (k, (right_hand_side, cofactor)) in rows.a.iter_mut().zip(rows.b).enumerate() {
@@ -182,15 +348,22 @@ impl Flow {
                 let [one, other] = [0, 1].map(|s| &points[STRESS_NODES * node + s].deformation);
                 let deformation = one.mean(other);
                 *cofactor = deformation.cofactor();
-                let volume_rate = cofactor.contract(x, y) / deformation.volume_ratio();
+                let mut water_rate = cofactor.contract(x, y) / deformation.volume_ratio();
+                if let Some(wetting) = wetting {
+                    water_rate *= wetting.saturation(node);
+                    water_rate -= wetting.inflow[node];
+                }
+                if let Some(edges) = edges.filter(|_| flows) {
+                    water_rate -= edges.inflow(node);
+                }
                 // dp = (gamma_f / C) dh-rate with C = n gamma_f / K_f.
-                *right_hand_side = excess[node] - dt * stiffness[node] * volume_rate;
+                *right_hand_side = excess[node] - dt * stiffness[node] * water_rate;
             }
         });
-        match (&mut self.scheme, &tables.diffusion) {
+        let scale = dt / self.unit_weight;
+        match (&mut self.scheme, &self.diffusion) {
             (Scheme::Explicit { acceleration_term }, Some(diffusion)) => {
                 let mobility = acceleration_term.then_some((&self.mobility, self.unit_weight));
-                let scale = dt / self.unit_weight;
                 let mut other = vec![(); excess.len()];
                 let rows = Rows { a: &mut self.right_hand_side, b: &mut unit, c: &mut other };
                 for_each_chunk(threaded, rows, &mut results, |first, rows, ()| {
@@ -207,39 +380,97 @@ impl Flow {
                                     weight.dot(&(mobility * acceleration[j]))
                                 })
                                 .sum();
-                            rate += carried * unit_weight;
+                            // What air has left no way for does not move by inertia either.
+                            let relative = wetting.map_or(1.0, |wetting| wetting.relative(node));
+                            rate += carried * unit_weight * relative;
                         }
                         *right_hand_side += scale * stiffness[node] * rate;
                     }
                 });
+                if let Some(edges) = edges {
+                    // A drain takes more in a step than a forward step bears: what it leaves follows at once.
+                    for (node, asked, open) in edges.drains() {
+                        let taken = dt * stiffness[node] * open;
+                        let left = &mut self.right_hand_side[node];
+                        *left = (*left + taken * asked) / (1.0 + taken);
+                    }
+                }
                 self.excess.copy_from_slice(&self.right_hand_side);
                 self.hold_surface();
             }
             (Scheme::Implicit { factors }, Some(diffusion)) => {
-                if factors.as_ref().is_none_or(|(made_for, _)| *made_for != dt) {
-                    let matrix =
-                        implicit_matrix(diffusion, &self.surface, &self.stiffness, dt / self.unit_weight);
+                let drains: Vec<_> = edges.into_iter().flat_map(WaterEdges::drains).collect();
+                let is_outgrown = wetting.is_some_and(|wetting| wetting.is_outgrown(stiffness));
+                if is_outgrown || factors.as_ref().is_none_or(|(made_for, _)| *made_for != dt) {
+                    if let Some(wetting) = &mut self.wetting {
+                        wetting.factored.clone_from(stiffness);
+                    }
+                    let matrix = implicit_matrix(diffusion, &self.surface, stiffness, &drains, (dt, scale));
                     *factors = BandedLu::factor(&matrix).map(|lu| (dt, lu));
                 }
                 let Some((_, lu)) = factors else { return false };
-                for tie in &self.surface {
-                    self.right_hand_side[tie.node as usize] = 0.0;
+                let right_hand_side = &mut self.right_hand_side;
+                for (node, asked, open) in &drains {
+                    right_hand_side[*node] += dt * stiffness[*node] * open * asked;
                 }
-                lu.solve(&mut self.right_hand_side);
-                self.excess.copy_from_slice(&self.right_hand_side);
+                let outside = |node: u32| edges.map_or(0.0, |edges| edges.at_surface(node as usize));
+                if self.wetting.is_some() {
+                    // The matrix may be older than the storage: it takes what is left to the rates at the start.
+                    for (node, left) in right_hand_side.iter_mut().enumerate() {
+                        let rate: f64 = diffusion.iter_row(node).map(|(j, weight)| weight * excess[j]).sum();
+                        *left += scale * stiffness[node] * rate - excess[node];
+                    }
+                    for (node, _, open) in &drains {
+                        right_hand_side[*node] -= dt * stiffness[*node] * open * excess[*node];
+                    }
+                    for tie in &self.surface {
+                        let (own, inner) = (excess[tie.node as usize], excess[tie.inner as usize]);
+                        let outside = outside(tie.node);
+                        right_hand_side[tie.node as usize] = outside + tie.fraction * (inner - outside) - own;
+                    }
+                    lu.solve(right_hand_side);
+                    for (excess, change) in self.excess.iter_mut().zip(right_hand_side) {
+                        *excess += *change;
+                    }
+                } else {
+                    for tie in &self.surface {
+                        right_hand_side[tie.node as usize] = (1.0 - tie.fraction) * outside(tie.node);
+                    }
+                    lu.solve(right_hand_side);
+                    self.excess.copy_from_slice(right_hand_side);
+                }
             }
             // Nothing flows, so nothing drains at the surface either.
             _ => self.excess.copy_from_slice(&self.right_hand_side),
         }
+        if let Some(wetting) = &mut self.wetting {
+            wetting.update(threaded, &self.excess, &mut self.stiffness);
+        }
+        self.feel();
         true
     }
 
-    /// Half-cell rule: zero excess belongs to the surface, not to the centre of the node below it.
+    /// Half-cell rule: the excess prescribed on the surface belongs there, not to the centre of the node below it.
     fn hold_surface(&mut self) {
         for tie in &self.surface {
-            self.excess[tie.node as usize] = tie.fraction * self.excess[tie.inner as usize];
+            let outside = self.edges.as_ref().map_or(0.0, |edges| edges.at_surface(tie.node as usize));
+            let inner = self.excess[tie.inner as usize];
+            self.excess[tie.node as usize] = outside + tie.fraction * (inner - outside);
         }
     }
+
+    /// What the grains feel of the present pressures.
+    fn feel(&mut self) {
+        for node in 0..self.felt.len() {
+            let outside = self.edges.as_ref().map_or(0.0, |edges| edges.at_surface(node));
+            self.felt[node] = outside + self.push[node] * (self.neutral(node) - outside);
+        }
+    }
+}
+
+/// Total head of a node at an excess pressure (kPa) over that at rest, m.
+fn head(model: &Model, excess: &[f64], unit_weight: f64, node: usize) -> f64 {
+    model.position[node].y + (model.pore_pressure[node] + excess[node]) / unit_weight
 }
 
 /// Pressure rise of a node per unit of volume strain, kPa. Above the water table air gives way.
@@ -247,8 +478,15 @@ fn stiffness(model: &Model, phases: &Phases, node: usize) -> f64 {
     if model.saturation(node) < 1.0 { 0.0 } else { model.water_stiffness(phases.porosity(node)) }
 }
 
-/// `I - dt/C div(k grad)` with the surface nodes' rows replaced by their tie.
-fn implicit_matrix(diffusion: &Csr<f64>, surface: &[SurfaceNode], stiffness: &[f64], scale: f64) -> Csr<f64> {
+/// `I - dt/C div(k grad)` with the surface nodes' rows replaced by their tie, and what `drains` take; `scale` is the time step
+/// over the unit weight of water.
+fn implicit_matrix(
+    diffusion: &Csr<f64>,
+    surface: &[SurfaceNode],
+    stiffness: &[f64],
+    drains: &[(usize, f64, f64)],
+    (dt, scale): (f64, f64),
+) -> Csr<f64> {
     let mut matrix = Csr::with_capacity(diffusion.rows(), diffusion.entries());
     let mut ties = surface.iter().peekable();
     for (row, stiffness) in stiffness.iter().enumerate() {
@@ -259,6 +497,8 @@ fn implicit_matrix(diffusion: &Csr<f64>, surface: &[SurfaceNode], stiffness: &[f
         } else {
             let (columns, weights) = diffusion.row(row);
             entries.extend(columns.iter().zip(weights).map(|(&c, w)| (c, -scale * stiffness * w)));
+            let taken = drains.iter().filter(|(node, _, _)| *node == row);
+            entries.extend(taken.map(|(_, _, open)| (own, dt * stiffness * open)));
         }
         matrix.push_row(&mut entries);
     }
@@ -266,12 +506,14 @@ fn implicit_matrix(diffusion: &Csr<f64>, surface: &[SurfaceNode], stiffness: &[f
 }
 
 /// Nodes within one spacing of the drained surface, each with the node below that it interpolates to. That surface is the
-/// ground, or the water table where it lies deeper; what is above it has no excess pressure.
+/// ground; or the water table where it lies deeper and soil above it holds no water that could move: no excess pressure
+/// there.
 fn surface_nodes(model: &Model, water: Water) -> Vec<SurfaceNode> {
     let is_partly_saturated = !model.saturation.is_empty();
+    let has_curve = |node: usize| model.regions[model.region[node] as usize].retention.is_some();
     let depth = |node: usize| {
         let below_ground = model.surface_elevation[node] - model.position[node].y;
-        if !is_partly_saturated {
+        if !is_partly_saturated || has_curve(node) {
             return below_ground;
         }
         if model.saturation(node) < 1.0 {
@@ -280,11 +522,14 @@ fn surface_nodes(model: &Model, water: Water) -> Vec<SurfaceNode> {
             below_ground.min(model.pore_pressure[node] / water.unit_weight)
         }
     };
-    let near: Vec<usize> = (0..model.nodes()).filter(|&node| depth(node) < model.spacing.y).collect();
+    // Suction ends at no surface, and goes its own way.
+    let is_held = |node: usize| !has_curve(node) || model.pore_pressure[node] >= 0.0;
+    let near: Vec<usize> =
+        (0..model.nodes()).filter(|&node| is_held(node) && depth(node) < model.spacing.y).collect();
     let below = |node: usize| Vec2::new(model.position[node].x, model.position[node].y - model.spacing.y);
     near.iter()
         .filter_map(|&node| {
-            if is_partly_saturated && depth(node) <= 0.0 {
+            if is_partly_saturated && !has_curve(node) && depth(node) <= 0.0 {
                 return Some(SurfaceNode { node: id(node), inner: id(node), fraction: 0.0 });
             }
             let wanted = below(node);
@@ -314,6 +559,16 @@ mod tests {
     };
     use sandboil_sph::Period;
 
+    fn flow_of(model: &Model, scheme: FlowScheme) -> (Flow, Geometry) {
+        let phases = Phases::new(model);
+        let walls = Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]);
+        let edges = (&model.outline, walls);
+        let geometry = Geometry::build(model, &model.position, &model.volume, edges, None);
+        let ground = Ground { model, phases: &phases, geometry: &geometry, position: &model.position, edges };
+        let flow = Flow::new(ground, scheme, &[]).unwrap().unwrap();
+        (flow, geometry)
+    }
+
     /// Steady flow up through two layers whose conductivities differ a thousandfold: the head falls in each by
     /// Darcy's law for the flux that is fed in below.
     #[test]
@@ -331,16 +586,15 @@ mod tests {
             region.hydraulic_conductivity = Conductivity::isotropic(conductivity);
         }
         model.region = (0..model.nodes()).map(|node| u32::from(node >= model.nodes() / 2)).collect();
-        let volume = vec![1.0; model.nodes()];
-        let walls = (&model.outline, Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]));
-        let geometry = Geometry::build(&model, &model.position, &volume, walls, None);
-        let diffusion = geometry.flow.unwrap().diffusion.unwrap();
+        let diffusion = flow_of(&model, FlowScheme::Explicit).0.diffusion.unwrap();
         // Storage so small that a step of one second is steady.
         let stiffness = vec![1e12; model.nodes()];
         let surface = surface_nodes(&model, model.water.unwrap());
         let mut head = vec![0.0; model.nodes()];
         head[..SIDE].fill(1e12);
-        BandedLu::factor(&implicit_matrix(&diffusion, &surface, &stiffness, 1.0)).unwrap().solve(&mut head);
+        BandedLu::factor(&implicit_matrix(&diffusion, &surface, &stiffness, &[], (1.0, 1.0)))
+            .unwrap()
+            .solve(&mut head);
         let fall = |from: usize, to: usize| (head[SIDE * from] - head[SIDE * to]) / (to - from) as f64;
         let (below, above) = (fall(2, 7), fall(12, 17));
         println!("gradients {below:.5} and {above:.3}, exact 1 and {CONTRAST}");
@@ -356,11 +610,15 @@ mod tests {
         let mut model = square_block(3);
         model.water = Some(Water { unit_weight: 10.0, bulk_modulus: 8.0 });
         let mut phases = Phases::new(&model);
-        let mut flow = Flow::new(&model, &phases, FlowScheme::Undrained).unwrap();
+        let (mut flow, geometry) = flow_of(&model, FlowScheme::Undrained);
         assert_eq!(flow.stiffness[4], 8.0 / 0.5);
         let strained = StressPoint { strain: [0.0, -0.1, 0.0], ..StressPoint::default() };
         phases.follow(&vec![strained; STRESS_NODES * model.nodes()]);
-        flow.geometry_changed(&model, &phases);
+        let walls = Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]);
+        let edges = (&model.outline, walls);
+        let ground =
+            Ground { model: &model, phases: &phases, geometry: &geometry, position: &model.position, edges };
+        flow.follow(ground, 0.0);
         let porosity = 1.0 - 0.5 * 0.1_f64.exp();
         assert!((flow.stiffness[4] - 8.0 / porosity).abs() < 1e-12);
     }
@@ -373,16 +631,13 @@ mod tests {
         model.surface_elevation = vec![1e3; model.nodes()];
         model.water = Some(Water { unit_weight: 10.0, bulk_modulus: 8.0 });
         model.regions[0].hydraulic_conductivity = Conductivity::isotropic(CONDUCTIVITY);
-        let volume = vec![1.0; model.nodes()];
-        let walls = (&model.outline, Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]));
-        let geometry = Geometry::build(&model, &model.position, &volume, walls, None);
-        let mut flow = Flow::new(&model, &Phases::new(&model), FlowScheme::ExplicitWithAcceleration).unwrap();
+        let (mut flow, geometry) = flow_of(&model, FlowScheme::ExplicitWithAcceleration);
         let acceleration: Vec<Vec2> =
             model.position.iter().map(|x| Vec2::new(0.2 * x.x, 0.5 * x.y)).collect();
         let still = vec![Vec2::zeros(); model.nodes()];
         let points = vec![StressPoint::default(); STRESS_NODES * model.nodes()];
         let dt = 1e-3;
-        assert!(flow.step(false, &geometry.flow.unwrap(), &points, &still, &acceleration, dt));
+        assert!(flow.step(false, &geometry.flow.unwrap(), &points, (&still, &acceleration), (dt, dt)));
         let expected = dt * (8.0 / 0.5) * CONDUCTIVITY / model.gravity * 0.7;
         assert!((flow.excess[40] - expected).abs() < 1e-12, "{} {expected}", flow.excess[40]);
     }

@@ -162,6 +162,7 @@ impl FreeField {
                     column_records: [None, None],
                     record_columns: None,
                     probes: Vec::new(),
+                    conditions: Vec::new(),
                     stress_histories: false,
                     pressure_envelope: false,
                     strain_envelope: false,

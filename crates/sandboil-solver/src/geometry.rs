@@ -106,8 +106,6 @@ pub struct FlowTables {
     /// `div v` at velocity nodes, component-wise weights with walls folded in (last term of Eq. 7). The
     /// transposed table is weighted with the row's volume: it is the pressure force.
     pub divergence: Paired<Vec2>,
-    /// `div (k grad H)` at velocity nodes, 1/s per m of head (Eq. 3); none if undrained.
-    pub diffusion: Option<Csr<f64>>,
 }
 
 /// Tables of the printed operators (Eqs 6, 10, 11).
@@ -236,10 +234,7 @@ impl Geometry {
         } else {
             wall_table
         };
-        let flow = model
-            .water
-            .is_some()
-            .then(|| flow_tables(model, &stencils, &list.from_velocity, &gradient, position));
+        let flow = model.water.is_some().then(|| flow_tables(&stencils, &list.from_velocity, position));
         let printed = (model.numerics.operators == Operators::Printed)
             .then(|| printed_tables(&stencils, &list, position, &stress_position, (outline, walls)));
         let nodes = position.len();
@@ -279,10 +274,7 @@ impl Geometry {
 
     /// Bytes of the weight tables.
     pub fn bytes(&self) -> usize {
-        let flow = self
-            .flow
-            .as_ref()
-            .map_or(0, |flow| flow.divergence.bytes() + flow.diffusion.as_ref().map_or(0, Csr::bytes));
+        let flow = self.flow.as_ref().map_or(0, |flow| flow.divergence.bytes());
         let printed = self.printed.as_ref().map_or(0, |tables| {
             let values = [&tables.interpolation, &tables.ghost_stress, &tables.mirror_stress];
             let vectors = [&tables.kernel_gradient, &tables.ghost_gradient, &tables.pressure_gradient];
@@ -408,29 +400,29 @@ pub fn static_conduction(model: &Model) -> Conduction {
     Conduction::new(model, &stencils, &gradient, position)
 }
 
-/// Divergence and diffusion at velocity nodes (Eq. 7), images folded: velocity by what they show of it, head even.
-fn flow_tables(
+/// Exchange of water in a section that has moved to `position`, with nodes of `volume` (m2); `geometry` is that of the place.
+pub fn conduction(
     model: &Model,
-    stencils: &Stencils,
-    list: &NeighbourList,
-    gradient: &Csr<GradientWeight>,
-    points: &[Vec2],
-) -> FlowTables {
+    geometry: &Geometry,
+    position: &[Vec2],
+    volume: &[f64],
+    (outline, walls): (&Outline, Walls),
+) -> Conduction {
+    let kernel = WendlandQuintic::new(model.smoothing_length());
+    let around = Surroundings::new(position, outline, walls, kernel.support());
+    let stencils = Stencils { around: &around, volume, kernel, period: model.period };
+    Conduction::new(model, &stencils, &geometry.gradient.forward, position)
+}
+
+/// Divergence at velocity nodes (Eq. 7), images folded.
+fn flow_tables(stencils: &Stencils, list: &NeighbourList, points: &[Vec2]) -> FlowTables {
     let mut divergence = Csr::with_capacity(points.len(), list.pairs());
     for (i, &at) in points.iter().enumerate() {
         divergence.push_row(&mut divergence_row(stencils, &stencils.all(list, i, at), id(i)));
     }
     let mut divergence = Paired::new(divergence, points.len());
     divergence.transposed.scale_by_column(stencils.volume);
-    let drains = model.regions.iter().any(|region| region.hydraulic_conductivity.major > 0.0);
-    let diffusion = drains.then(|| {
-        let inverse: Vec<f64> = stencils.volume.iter().map(|volume| volume.recip()).collect();
-        let mut diffusion =
-            Conduction::new(model, stencils, gradient, points).saturated(|pair| pair.at_surface);
-        diffusion.scale_by_row(&inverse);
-        diffusion
-    });
-    FlowTables { divergence, diffusion }
+    FlowTables { divergence }
 }
 
 /// Tables of Eqs 6, 9, 10 and 11 as printed.

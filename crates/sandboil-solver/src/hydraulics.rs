@@ -10,7 +10,7 @@ use crate::{
 use sandboil_sph::Vec2;
 
 /// A value that changes with time: straight between samples, constant before the first and after the last.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Series {
     /// Rising times, s.
     pub time: Vec<f64>,
@@ -62,7 +62,7 @@ impl Series {
 }
 
 /// What happens on a stretch of edge. Edges without a condition are impermeable.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum HydraulicCondition {
     /// Total head, m.
     Head(Series),
@@ -97,21 +97,28 @@ impl HydraulicCondition {
         self.series().and_then(|(_, series)| series.next_after(time))
     }
 
-    /// What the condition asks of a place at a time; `unit_weight` of water in kN/m3, `slope` the horizontal share of
-    /// its length.
-    pub fn demand(&self, time: f64, elevation: f64, slope: f64, unit_weight: f64) -> Demand {
+    /// What is prescribed at a time; zero where nothing is.
+    pub fn value(&self, time: f64) -> f64 {
+        self.series().map_or(0.0, |(_, series)| series.at(time))
+    }
+
+    /// Whether what is prescribed does not change with time.
+    pub fn is_constant(&self) -> bool {
+        self.series().is_none_or(|(_, series)| series.value.len() == 1)
+    }
+
+    /// What the condition asks of a place where it prescribes `value`; `unit_weight` of water in kN/m3, `slope` the
+    /// horizontal share of its length.
+    pub fn demand(&self, value: f64, elevation: f64, slope: f64, unit_weight: f64) -> Demand {
         let held = |head: f64| Demand { inflow: f64::INFINITY, head };
         let open = |inflow: f64| Demand { inflow, head: elevation };
         match self {
-            Self::Head(series) => held(series.at(time)),
-            Self::Pressure(series) => held(elevation + series.at(time) / unit_weight),
-            Self::Flux(series) => Demand { inflow: series.at(time), head: f64::INFINITY },
-            Self::Rain(series) => open(series.at(time) * slope),
-            Self::Reservoir(series) => {
-                let level = series.at(time);
-                if elevation < level { held(level) } else { open(0.0) }
-            }
-            Self::SeepageFace | Self::Drain => open(0.0),
+            Self::Head(_) => held(value),
+            Self::Pressure(_) => held(elevation + value / unit_weight),
+            Self::Flux(_) => Demand { inflow: value, head: f64::INFINITY },
+            Self::Rain(_) => open(value * slope),
+            Self::Reservoir(_) if elevation < value => held(value),
+            Self::Reservoir(_) | Self::SeepageFace | Self::Drain => open(0.0),
         }
     }
 
@@ -122,7 +129,7 @@ impl HydraulicCondition {
 }
 
 /// What a place on an edge takes: an inflow, or less where more would raise its head above a limit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Demand {
     /// Most that flows in, m/s; infinite where the head alone is prescribed.
     pub inflow: f64,
@@ -131,7 +138,7 @@ pub struct Demand {
 }
 
 /// A condition and the line on which it holds.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct HydraulicBoundary {
     /// Points of the line, m.
     pub line: Vec<Vec2>,
@@ -140,7 +147,7 @@ pub struct HydraulicBoundary {
 }
 
 /// The stretch of a boundary that belongs to one node.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Cell {
     /// Index of the boundary.
     pub boundary: usize,
@@ -154,13 +161,24 @@ pub struct Cell {
     pub middle: Vec2,
 }
 
+impl Cell {
+    /// Inflow of a drain's cell per metre of head, m/s, in soil of so much conductivity (m/s): water comes to it from both
+    /// of its sides, over half a spacing.
+    pub fn drain_conductance(&self, conductivity: f64, spacing: f64) -> f64 {
+        4.0 * conductivity * self.length / spacing
+    }
+}
+
 /// Boundaries cut into cells, and which of them each pair across an edge belongs to.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Cells {
     /// The cells.
     pub cells: Vec<Cell>,
     /// Cells that each pair beyond an edge is seen across; none where the edge is impermeable.
     pub of_pair: Vec<[Option<u32>; 2]>,
+    /// Pieces of the boundaries, to find the cells of images' feet by.
+    samples: Vec<Sample>,
+    spacing: f64,
 }
 
 /// Samples of a boundary line per spacing.
@@ -177,7 +195,7 @@ const PAST_THE_END: f64 = 0.1;
 const LARGEST_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// A short piece of a boundary line.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Sample {
     at: Vec2,
     direction: Vec2,
@@ -254,19 +272,35 @@ impl Cells {
             cell.slope /= cell.length;
             cell.middle /= cell.length;
         }
-        let places: Vec<Vec2> = samples.iter().map(|sample| sample.at).collect();
+        let mut all = Self { cells, of_pair: Vec::new(), samples, spacing };
+        all.assign(beyond, |_| Vec2::zeros());
+        Ok(all)
+    }
+
+    /// Finds the cell of every pair beyond an edge, on boundaries that have gone with the ground: each piece of them by the
+    /// displacement of the node beside it, m.
+    pub fn assign(&mut self, beyond: &[Beyond], displacement: impl Fn(u32) -> Vec2) {
+        let spacing = self.spacing;
+        let place = |sample: &Sample| sample.at + displacement(self.cells[sample.cell as usize].node);
+        let places: Vec<Vec2> = self.samples.iter().map(place).collect();
         let bins = Bins::new(&places, ON_THE_LINE * spacing);
         let cell_of = |crossing: Option<Crossing>| {
             let Crossing { foot, normal } = crossing?;
             let belongs = |sample: usize| {
-                let Sample { at, direction, half, .. } = samples[sample];
+                let Sample { direction, half, .. } = self.samples[sample];
                 // The end of a line is no part of the edge that meets it in a corner, nor of the edge that goes on.
                 direction.dot(&normal).abs() < LARGEST_COSINE
-                    && (foot - at).dot(&direction).abs() < half + PAST_THE_END * spacing
+                    && (foot - places[sample]).dot(&direction).abs() < half + PAST_THE_END * spacing
             };
-            bins.nearest(&places, foot, belongs).map(|sample| samples[sample].cell)
+            bins.nearest(&places, foot, belongs).map(|sample| self.samples[sample].cell)
         };
-        let of_pair = beyond.iter().map(|pair| pair.crossings.map(cell_of)).collect();
-        Ok(Self { cells, of_pair })
+        self.of_pair = beyond.iter().map(|pair| pair.crossings.map(cell_of)).collect();
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.cells.as_slice())
+            + size_of_val(self.of_pair.as_slice())
+            + size_of_val(self.samples.as_slice())
     }
 }

@@ -33,6 +33,8 @@ mod soil_field;
 mod spectrum_tests;
 pub mod state;
 mod timestep;
+mod water_edges;
+mod wetting;
 
 pub use base::{Base, BaseSegment, HalfSpace, Impedance, UpgoingWave, Vertical};
 pub use boundary::{Outline, Side, Support};
@@ -51,3 +53,4 @@ pub use simulation::{
 };
 pub use state::StateError;
 pub use timestep::Criterion;
+pub use water_edges::MovingBoundary;

@@ -7,7 +7,7 @@
 use crate::{
     banded::BandedLu,
     boundary::id,
-    conduction::{Conduction, Rows, collected},
+    conduction::{Conduction, Rows, between, collected},
     error::SolverError,
     geometry::static_conduction,
     hydraulics::{Cell, Cells, Demand, HydraulicBoundary},
@@ -542,12 +542,6 @@ impl Seepage {
         (content - (outer_content - at_outer.saturation) - bend * (head - outer), slope - bend)
     }
 
-    /// Relative conductivity between two nodes: their mean, which places a wetting front within a spacing, where that of
-    /// the wetter one lets it run ahead.
-    fn between(relative: &[f64], i: usize, j: usize) -> f64 {
-        0.5 * (relative[i] + relative[j])
-    }
-
     /// Inflow that follows the gradient at stress nodes, whose conductivities are those of their nodes, m2/s.
     fn flow_along(&self, relative: &[f64], head: &[f64]) -> Vec<f64> {
         let mut inflow = vec![0.0; head.len()];
@@ -557,7 +551,7 @@ impl Seepage {
 
     /// Inflow of every node at the present heads' conductivities. Fills the cells' flow.
     fn inflow(&mut self, time: f64, relative: &[f64]) -> Inflow {
-        let mut rows = self.conduction.pair_rows(|i, j| Self::between(relative, i, j));
+        let mut rows = self.conduction.pair_rows(|i, j| between(relative, i, j));
         let mut constant = vec![0.0; self.head.len()];
         self.flow.fill(0.0);
         let demands = self.demands(time);
@@ -579,7 +573,7 @@ impl Seepage {
                     strength
                 }
                 // Two heads in a corner show a node on beyond both: what passes between the edges is left to them.
-                _ => pair.closed * Self::between(relative, i, j),
+                _ => pair.closed * between(relative, i, j),
             };
             if sign > 0.0 {
                 offset = 0.0;
@@ -621,7 +615,7 @@ impl Seepage {
         i: usize,
         j: usize,
     ) -> f64 {
-        let of_soil = Self::between(relative, i, j);
+        let of_soil = between(relative, i, j);
         if inward <= 0.0 {
             return of_soil;
         }
@@ -633,14 +627,13 @@ impl Seepage {
     fn demands(&self, time: f64) -> Vec<Demand> {
         let demand = |cell: &Cell| {
             let condition = &self.boundaries[cell.boundary].condition;
-            condition.demand(time, cell.middle.y, cell.slope, self.water.unit_weight)
+            condition.demand(condition.value(time), cell.middle.y, cell.slope, self.water.unit_weight)
         };
         self.cells.cells.iter().map(demand).collect()
     }
 
-    /// Inflow of a drain's cell per metre of head, m/s: water comes to it from both of its sides, over half a spacing.
     fn drain_conductance(&self, cell: &Cell) -> f64 {
-        4.0 * self.conductivity[cell.node as usize] * cell.length / self.spacing
+        cell.drain_conductance(self.conductivity[cell.node as usize], self.spacing)
     }
 
     fn begin_cells(&mut self) {

@@ -9,7 +9,7 @@ use crate::{
     deformation::Deformation,
     dispersion::{Dispersion, lumped_masses},
     error::SolverError,
-    flow::{Flow, FlowScheme},
+    flow::{Flow, FlowScheme, Ground},
     free_field::{FreeField, Section},
     geometry::{Geometry, consistent_gradient, point_weights, stress_node_positions, stress_node_values},
     model::{AccelerationTerm, Diffusion, Model, Operators, STRESS_NODES},
@@ -24,6 +24,7 @@ use crate::{
     soil_field::SoilField,
     state::{self, StateError},
     timestep::{Criterion, PressureCoupling, PressureSpectrum, region_limit},
+    water_edges::MovingBoundary,
 };
 use sandboil_soil::{Stress, UpdateReport};
 use sandboil_sph::Vec2;
@@ -74,6 +75,8 @@ pub struct Shaking {
     pub local_damping: f64,
     /// Rayleigh damping, if any.
     pub rayleigh: Option<Rayleigh>,
+    /// Hydraulic conditions. Without one the ground surface keeps its pressure, and all other edges are impermeable.
+    pub conditions: Vec<MovingBoundary>,
     /// Factor on the stability limit.
     pub time_step_factor: f64,
     /// Points where histories are read, m.
@@ -390,10 +393,10 @@ impl Simulation {
         // The columns hold theirs.
         stage.column_records = [None, None];
         let scheme = self.flow_scheme(stage.time_step_factor);
-        let excess = self.flow.take().map(|flow| flow.excess);
-        self.flow = Flow::new(&self.model, &self.phases, scheme);
-        if let (Some(flow), Some(excess)) = (&mut self.flow, excess) {
-            flow.excess = excess;
+        let before = self.flow.take();
+        self.flow = Flow::new(self.ground(&outline), scheme, &stage.conditions)?;
+        if let (Some(flow), Some(before)) = (&mut self.flow, before) {
+            flow.set_excess(|excess| excess.copy_from_slice(before.excess()));
         }
         if let Some(free_field) = &mut free_field {
             self.set_guests(free_field.guests());
@@ -517,6 +520,16 @@ impl Simulation {
         }
     }
 
+    fn ground<'a>(&'a self, outline: &'a Outline) -> Ground<'a> {
+        Ground {
+            model: &self.model,
+            phases: &self.phases,
+            geometry: &self.geometry,
+            position: &self.position,
+            edges: (outline, self.walls),
+        }
+    }
+
     /// Gives the section an excess pore pressure (kPa, user's node order) before the first step of shaking, held
     /// in balance by a load that stays: the start of consolidation under a load just put on.
     ///
@@ -533,11 +546,13 @@ impl Simulation {
                 needs: "water and a shaking stage that has just begun",
             });
         };
-        for (slot, &user) in flow.excess.iter_mut().zip(&self.order) {
-            *slot = excess[user];
-        }
+        flow.set_excess(|own| {
+            for (slot, &user) in own.iter_mut().zip(&self.order) {
+                *slot = excess[user];
+            }
+        });
         if let Some(free_field) = &mut shaking.free_field {
-            free_field.set_excess(&self.edges, &flow.excess);
+            free_field.set_excess(&self.edges, flow.excess());
         }
         self.store_reaction();
         Ok(())
@@ -584,11 +599,12 @@ impl Simulation {
         // The tables are replaced as a whole; the lists of the old ones serve while no node left their skin.
         let previous = self.geometry.clone();
         self.follow_volumes();
-        let (volume, outline) = (self.phases.volume(), self.present_outline());
-        let walls = (&outline, self.walls);
+        let outline = self.present_outline();
+        let (volume, walls) = (self.phases.volume(), (&outline, self.walls));
         self.geometry = Geometry::build(&self.model, &self.position, volume, walls, Some(previous));
-        if let Some(flow) = &mut self.flow {
-            flow.geometry_changed(&self.model, &self.phases);
+        if let Some(mut flow) = self.flow.take() {
+            flow.follow(self.ground(&outline), self.time);
+            self.flow = Some(flow);
         }
         self.counters.geometry_builds += 1;
         self.sharpen_contacts();
@@ -767,7 +783,7 @@ impl Simulation {
                 None => force += flow.force(tables, j),
                 Some(printed) => {
                     for (i, gradient) in printed.pressure_gradient.iter_row(j) {
-                        force -= gradient * (flow.excess[i] * self.phases.volume()[j]);
+                        force -= gradient * (flow.neutral(i) * self.phases.volume()[j]);
                     }
                 }
             }
@@ -1000,7 +1016,8 @@ impl Simulation {
         if let (Some(flow), Some(tables)) = (&mut self.flow, &self.geometry.flow) {
             self.counters.flow_calls += 1;
             let (points, threaded) = (&self.points, self.threads > 1);
-            if !flow.step(threaded, tables, points, &self.velocity, &self.acceleration, dt) {
+            let motion = (self.velocity.as_slice(), self.acceleration.as_slice());
+            if !flow.step(threaded, tables, points, motion, (self.time + dt, dt)) {
                 return Err(self.diverged("pore pressure matrix", 0, f64::NAN));
             }
         }
@@ -1018,11 +1035,12 @@ impl Simulation {
     /// Finiteness, stability limit and geometry, every few steps.
     fn check(&mut self, shaking: &mut ActiveShaking) -> Result<(), SolverError> {
         self.check_finite("velocity", |simulation, j| simulation.velocity[j].norm(), RUNAWAY_SPEED)?;
-        if let Some(flow) = &self.flow
-            && let Some(j) = flow.excess.iter().position(|p| !p.is_finite())
-        {
-            let value = flow.excess[j];
-            return Err(self.diverged("pore pressure", j, value));
+        if let Some(flow) = &mut self.flow {
+            if let Some(j) = flow.excess().iter().position(|p| !p.is_finite()) {
+                let value = flow.excess()[j];
+                return Err(self.diverged("pore pressure", j, value));
+            }
+            flow.refresh(&self.model, self.time);
         }
         let factor = shaking.stage.time_step_factor;
         let (target, criterion) = self.shared_limit(shaking.coupling, factor, shaking.free_field.as_ref());
@@ -1047,7 +1065,7 @@ impl Simulation {
     /// moved yet: every quantity of a sample belongs to the same instant.
     fn record(&self, shaking: &mut ActiveShaking) {
         if let (Some(envelope), Some(flow)) = (&mut shaking.pressure_envelope, &self.flow) {
-            for (largest, &excess) in envelope.iter_mut().zip(&flow.excess) {
+            for (largest, &excess) in envelope.iter_mut().zip(flow.excess()) {
                 *largest = largest.max(excess);
             }
         }
@@ -1070,7 +1088,7 @@ impl Simulation {
                 acceleration += self.acceleration[j] * weight;
                 velocity += (self.velocity[j] - self.acceleration[j] * (0.5 * self.dt)) * weight;
                 displacement += (self.position[j] - self.initial_position[j]) * weight;
-                excess += self.flow.as_ref().map_or(0.0, |flow| flow.excess[j]) * weight;
+                excess += self.flow.as_ref().map_or(0.0, |flow| flow.excess()[j]) * weight;
             }
             for vector in [acceleration, velocity, displacement] {
                 put(vector.x);
@@ -1164,7 +1182,7 @@ impl Simulation {
     /// Sets the excess pore pressure of a node, kPa.
     pub(crate) fn set_excess_at(&mut self, node: usize, excess: f64) {
         if let Some(flow) = &mut self.flow {
-            flow.excess[node] = excess;
+            flow.set_excess(|own| own[node] = excess);
         }
     }
 
@@ -1324,7 +1342,13 @@ impl Simulation {
     /// Excess pore pressure since shaking began, kPa; `None` without water.
     pub fn excess_pore_pressure(&self) -> Option<Vec<f64>> {
         self.model.water?;
-        Some(self.in_user_order(|j| self.flow.as_ref().map_or(0.0, |flow| flow.excess[j])))
+        Some(self.in_user_order(|j| self.flow.as_ref().map_or(0.0, |flow| flow.excess()[j])))
+    }
+
+    /// Degree of saturation; `None` where it cannot change: without retention curves, and before shaking.
+    pub fn saturation(&self) -> Option<Vec<f64>> {
+        let saturation = self.flow.as_ref()?.saturation()?;
+        Some(self.in_user_order(saturation))
     }
 
     /// Effective stress `(xx, yy, xy, zz)` of every velocity node's two stress nodes, kPa, tension positive.

@@ -82,6 +82,7 @@ pub fn shaking(wave: Option<UpgoingWave>, duration: f64, probes: Vec<Vec2>) -> S
         time_step_factor: SHAKING_FACTOR,
         probes,
         history_interval: 0.001,
+        conditions: Vec::new(),
         stress_histories: false,
         pressure_envelope: false,
         strain_envelope: false,

@@ -6,6 +6,7 @@ mod common;
 mod consolidation;
 mod free_field;
 mod half_space;
+mod moving_water;
 mod open_edges;
 mod rayleigh;
 mod resume;
