@@ -399,19 +399,20 @@ impl Flow {
                 self.hold_surface();
             }
             (Scheme::Implicit { factors }, Some(diffusion)) => {
-                let drains: Vec<_> = edges.into_iter().flat_map(WaterEdges::drains).collect();
+                let drains = || edges.into_iter().flat_map(WaterEdges::drains);
                 let is_outgrown = wetting.is_some_and(|wetting| wetting.is_outgrown(stiffness));
                 if is_outgrown || factors.as_ref().is_none_or(|(made_for, _)| *made_for != dt) {
                     if let Some(wetting) = &mut self.wetting {
                         wetting.factored.clone_from(stiffness);
                     }
+                    let drains: Vec<_> = drains().collect();
                     let matrix = implicit_matrix(diffusion, &self.surface, stiffness, &drains, (dt, scale));
                     *factors = BandedLu::factor(&matrix).map(|lu| (dt, lu));
                 }
                 let Some((_, lu)) = factors else { return false };
                 let right_hand_side = &mut self.right_hand_side;
-                for (node, asked, open) in &drains {
-                    right_hand_side[*node] += dt * stiffness[*node] * open * asked;
+                for (node, asked, open) in drains() {
+                    right_hand_side[node] += dt * stiffness[node] * open * asked;
                 }
                 let outside = |node: u32| edges.map_or(0.0, |edges| edges.at_surface(node as usize));
                 if self.wetting.is_some() {
@@ -420,8 +421,8 @@ impl Flow {
                         let rate: f64 = diffusion.iter_row(node).map(|(j, weight)| weight * excess[j]).sum();
                         *left += scale * stiffness[node] * rate - excess[node];
                     }
-                    for (node, _, open) in &drains {
-                        right_hand_side[*node] -= dt * stiffness[*node] * open * excess[*node];
+                    for (node, _, open) in drains() {
+                        right_hand_side[node] -= dt * stiffness[node] * open * excess[node];
                     }
                     for tie in &self.surface {
                         let (own, inner) = (excess[tie.node as usize], excess[tie.inner as usize]);

@@ -693,16 +693,21 @@ impl Simulation {
         factor: f64,
     ) -> (f64, Criterion) {
         let corrected = self.dispersion.is_some();
-        let mut stiffest = vec![0.0_f64; self.model.regions.len()];
-        for (s, point) in self.points.iter().enumerate() {
-            let slot = &mut stiffest[self.model.region[s / STRESS_NODES] as usize];
-            *slot = slot.max(point.stiffness);
-        }
-        let (dt, criterion) = stiffest
-            .iter()
-            .enumerate()
-            .filter(|(_, stiffness)| **stiffness > 0.0)
-            .map(|(region, &stiffness)| {
+        // Nodes are sorted by region: each is one stretch.
+        let mut first = 0;
+        let (dt, criterion) = self
+            .model
+            .region
+            .chunk_by(|a, b| a == b)
+            .map(|stretch| {
+                let points = STRESS_NODES * first..STRESS_NODES * (first + stretch.len());
+                first += stretch.len();
+                let stiffest =
+                    self.points[points].iter().fold(0.0_f64, |most, point| most.max(point.stiffness));
+                (stretch[0] as usize, stiffest)
+            })
+            .filter(|(_, stiffness)| *stiffness > 0.0)
+            .map(|(region, stiffness)| {
                 region_limit(&self.model, region, stiffness, coupling, &self.spectrum, rayleigh, corrected)
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
