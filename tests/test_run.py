@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import runpy
 import signal
@@ -261,6 +262,51 @@ def test_divergence_keeps_what_was_computed(tmp_path: Path) -> None:
     # The last frame is the state in which it stopped.
     assert results.times[-1] == told.time
     assert len(results.history("velocity_x").time) > 0 or told.time < 0.05
+
+
+def test_divergence_leaves_its_neighbourhood(tmp_path: Path) -> None:
+    with pytest.raises(SimulationDiverged) as caught:
+        run(scenes.diverging_column(), tmp_path)
+    told, results = caught.value, load(tmp_path)
+    with (tmp_path / "neighbourhood.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    # The offending node and all others within six spacings at rest.
+    assert int(rows[0]["node"]) == told.node
+    away = np.linalg.norm(results.position - results.position[told.node], axis=1)
+    assert {int(row["node"]) for row in rows} == set(np.flatnonzero(away <= 6.0 * 0.25).tolist())
+    for row in rows:
+        node = int(row["node"])
+        assert (float(row["x (m)"]), float(row["y (m)"])) == tuple(results.position[node])
+        assert row["region"] == "rock"
+        assert float(row["velocity_x (m/s)"]) == results.field("velocity")[node, 0]
+        assert float(row["sigma_v_eff (kPa)"]) == results.field("sigma_v_eff")[node]
+    assert (tmp_path / "neighbourhood.png").read_bytes().startswith(b"\x89PNG")
+    assert str(tmp_path / "neighbourhood.csv") in told.__notes__[-1]
+
+
+def test_a_neighbourhood_that_cannot_be_written_hides_no_divergence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr("sandboil._neighbourhood.write", full)
+    with pytest.raises(SimulationDiverged) as caught:
+        run(scenes.diverging_column(), tmp_path)
+    assert "No space left" in caught.value.__notes__[-1]
+    assert load(tmp_path).status == "stopped"
+
+
+def test_a_diverged_run_is_gone_on_with_from_its_last_state(tmp_path: Path) -> None:
+    with pytest.raises(SimulationDiverged) as first:
+        run(scenes.diverging_column(), tmp_path / "out")
+    # It is the same run, and so diverges in the same place; its ground at rest serves one that does not.
+    with pytest.raises(SimulationDiverged) as again:
+        run(scenes.diverging_column(), tmp_path / "out", resume=True)
+    assert str(again.value) == str(first.value)
+    mended = run(scenes.dry_column(), tmp_path / "mended", start=(tmp_path / "out", "gravity"))
+    assert mended.status == "complete"
+    assert not (tmp_path / "mended" / "neighbourhood.csv").exists()
 
 
 def interrupt_when_shaking(folder: Path, number: signal.Signals) -> subprocess.Popen[str]:

@@ -340,6 +340,32 @@ def section(run: Run, *, stage: str | None = None) -> Figure:
     return figure
 
 
+def neighbourhood(place: Floats, speed: Floats, stress: Floats, told: str, path: Path) -> None:
+    """Draw the nodes around the first of `place` (n, 2), m, where a run diverged, into a PNG.
+
+    With their speed (m/s, n) and vertical effective stress (kPa, n); values that are not finite are crosses.
+    Raises :class:`OSError`.
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(10.0, 4.8), layout="constrained")
+        panels = figure.subplots(1, 2, sharex=True, sharey=True)
+        labels = ("speed, m/s", "vertical effective stress, kPa")
+        for axes, values, label in zip(panels, (speed, stress), labels, strict=True):
+            finite = np.isfinite(values)
+            # A runaway spans decades, and its neighbours shall be seen beside it.
+            norm = "log" if values is speed and np.any(speed[finite] > 0.0) else "linear"
+            image = axes.scatter(*place[finite].T, c=values[finite], norm=norm, cmap="viridis", s=60.0)
+            figure.colorbar(image, ax=axes, label=label)
+            axes.plot(*place[0], "o", mfc="none", mec=REFERENCE, mew=1.5, ms=13.0, label="diverged")
+            axes.plot(*place[~finite].T, "x", color=REFERENCE, ms=7.0, label="not finite")
+            (x, y), reach = place[0], 1.1 * np.abs(place - place[0]).max()
+            axes.set(xlim=(x - reach, x + reach), ylim=(y - reach, y + reach), aspect="equal")
+            axes.set(xlabel="x at rest, m", ylabel="y at rest, m")
+        figure.suptitle(told, fontsize=9)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        figure.savefig(path, dpi=DPI)
+
+
 def _draw_map(run: Run, stage: str, times: Floats, axes: Axes) -> None:
     profile = run.profile("sigma_v_eff", stage=stage)
     nodes = run.column(profile.x)

@@ -19,9 +19,9 @@ from typing import Any, Literal, get_args
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from . import checkpoint
+from . import _neighbourhood, checkpoint
 from ._committed_file import twin_of
-from ._errors import InvalidInput, ResumeWarning, RunInterrupted, SandboilError
+from ._errors import InvalidInput, ResumeWarning, RunInterrupted, SandboilError, SimulationDiverged
 from .columns import save as save_column
 from .results import FILE_NAME, Run, Writer, holds, repair
 from .scene import Gravity, Scene
@@ -96,8 +96,9 @@ def run(
         read or used, an unknown accuracy, a run to resume or start from that is not of this scene
     RunInterrupted : Ctrl-C or a request to terminate; the results are complete up to that moment, and the
         run can be resumed there
-    SimulationDiverged, SandboilError : the run stopped itself, or its folder could not be written; the
-        results until then are kept
+    SimulationDiverged : a field lost its meaning; results and checkpoints until then are kept, and
+        `neighbourhood.csv` and `.png` show the nodes around the place
+    SandboilError : the run stopped itself, or its folder could not be written; results until then are kept
 
     Warns
     -----
@@ -258,8 +259,21 @@ def _run_stages(
         raise
     except SandboilError as error:
         writer.close("stopped", str(error))
+        if isinstance(error, SimulationDiverged):
+            _tell_where(simulation, error, writer.path.parent)
         raise
     writer.close("complete")
+
+
+def _tell_where(simulation: Simulation, error: SimulationDiverged, folder: Path) -> None:
+    """Leave a table and a picture of the nodes around a divergence, and note them in the error."""
+    try:
+        paths = _neighbourhood.write(folder, simulation, error)
+    except OSError as failure:
+        # The divergence is what matters.
+        error.add_note(f"its neighbourhood could not be written: {failure}")
+        return
+    error.add_note(f"its neighbourhood: {', '.join(str(path) for path in paths)}")
 
 
 def _run_stage(

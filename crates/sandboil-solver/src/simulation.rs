@@ -814,7 +814,10 @@ impl Simulation {
             None => self.run(steps, until),
         };
         self.pool = pool;
-        outcome
+        // Nobody sees, keeps or goes on from a state that is no longer one.
+        let done = outcome?;
+        self.guard()?;
+        Ok(done)
     }
 
     fn run(&mut self, steps: u64, until: f64) -> Result<bool, SolverError> {
@@ -1039,12 +1042,8 @@ impl Simulation {
 
     /// Finiteness, stability limit and geometry, every few steps.
     fn check(&mut self, shaking: &mut ActiveShaking) -> Result<(), SolverError> {
-        self.check_finite("velocity", |simulation, j| simulation.velocity[j].norm(), RUNAWAY_SPEED)?;
+        self.guard()?;
         if let Some(flow) = &mut self.flow {
-            if let Some(j) = flow.excess().iter().position(|p| !p.is_finite()) {
-                let value = flow.excess()[j];
-                return Err(self.diverged("pore pressure", j, value));
-            }
             flow.refresh(&self.model, self.time);
         }
         let factor = shaking.stage.time_step_factor;
@@ -1115,6 +1114,16 @@ impl Simulation {
             }
         }
         shaking.recorder.push(self.time, self.dt, values);
+    }
+
+    /// Refuses motion and pore pressure that are no longer finite, and motion that runs away. Strain and stress are
+    /// refused by the soil models, or show in the next step's motion.
+    fn guard(&self) -> Result<(), SolverError> {
+        self.check_finite("velocity", |simulation, j| simulation.velocity[j].norm(), RUNAWAY_SPEED)?;
+        match &self.flow {
+            Some(flow) => self.check_finite("pore pressure", |_, j| flow.excess()[j].abs(), f64::INFINITY),
+            None => Ok(()),
+        }
     }
 
     fn check_finite(

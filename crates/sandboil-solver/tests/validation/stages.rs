@@ -163,6 +163,24 @@ fn a_bursting_sand_column_is_told_at_once() {
     assert!(matches!(error, sandboil_solver::SolverError::Diverged { .. }), "{error}");
 }
 
+/// A state that has lost its meaning is told before anybody can read or store it, between the checks of every few steps.
+#[test]
+fn no_state_is_handed_out_that_is_none() {
+    for lost in [f64::NAN, 1e5] {
+        let region = elastic(4e4, 8e4);
+        let mut simulation = at_rest(&column(HEIGHT, SPACING, 1, region, Some(WATER)));
+        simulation.begin_shaking(shaking(None, 1.0, Vec::new())).unwrap();
+        let mut velocity = vec![[0.0; 2]; simulation.nodes()];
+        velocity[7][0] = lost;
+        simulation.set_velocity(&velocity).unwrap();
+        let error = simulation.advance(1, f64::INFINITY).unwrap_err();
+        let sandboil_solver::SolverError::Diverged { quantity, step: 1, .. } = error else {
+            panic!("{error}")
+        };
+        assert_eq!(quantity, "velocity");
+    }
+}
+
 /// Envelopes hold the largest value of every step, not only of those that anybody looks at.
 #[test]
 fn envelopes_see_every_step() {
