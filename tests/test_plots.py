@@ -58,7 +58,7 @@ def axes_without_words(figure: Figure) -> list[Axes]:
 
 def test_every_picture_is_written(finished: Run, tmp_path: Path, reference_folder: Path) -> None:
     paths = plot(finished, tmp_path, reference=Reference.read(reference_folder))
-    names = ["surface.png", "pore_pressure.png", "column.png", "stress_paths.png"]
+    names = ["surface.png", "pore_pressure.png", "column.png", "energy.png", "stress_paths.png"]
     assert [path.name for path in paths] == names
     assert all(path.read_bytes().startswith(PNG) for path in paths)
 
@@ -68,7 +68,7 @@ def test_pictures_lie_in_the_folder_of_the_run_by_default(tmp_path: Path) -> Non
     paths = plot(results)
     assert {path.parent for path in paths} == {tmp_path / "plots"}
     # Without water there is no pore pressure to draw.
-    assert [path.name for path in paths] == ["surface.png", "column.png", "stress_paths.png"]
+    assert [path.name for path in paths] == ["surface.png", "column.png", "energy.png", "stress_paths.png"]
 
 
 def test_a_slope_is_drawn_as_a_section(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 import scenes
-from sandboil import Gravity, InvalidInput, Run, Scene, Shaking, load, response_spectrum, run
+from sandboil import Gravity, InvalidInput, Run, Scene, Shaking, _core, load, response_spectrum, run
 from sandboil.results import FILE_NAME, FORMAT_VERSION, Summary
 
 # The file
@@ -40,6 +40,9 @@ def test_the_file_tells_what_made_it(finished: Run) -> None:
     # Defaults are written out: they may change, the meaning of this file may not.
     assert "smoothing_ratio" in finished.scene.numerics.model_fields_set
     assert set(finished.versions) == {"sandboil", "core", "h5py", "numpy"}
+    assert finished.revision == _core.__revision__
+    assert finished.machine["threads"] == 1
+    assert {"system", "processor", "processors", "python_version"} <= finished.machine.keys()
     assert finished.versions["sandboil"] == finished.versions["core"]
 
 

@@ -58,14 +58,14 @@ class Killed(BaseException):
 
 
 def contents(folder: Path) -> dict[str, Any]:
-    """All that a results file holds but wall times and how often it was resumed."""
+    """All that a results file holds but wall times, the machine, and how often it was resumed."""
     found: dict[str, Any] = {}
 
     def look(name: str, item: h5py.Group | h5py.Dataset) -> None:
         if isinstance(item, h5py.Dataset) and name != "frames/wall_time":
             found[name] = item[()].tobytes() if item.dtype.kind != "O" else list(item.asstr()[()])
         for key, value in item.attrs.items():
-            if key != "wall_time_s":
+            if key != "wall_time_s" and name != "machine":
                 found[f"{name}@{key}"] = np.asarray(value).tobytes()
 
     with h5py.File(folder / FILE_NAME, "r") as file:

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 __all__ = [
     "ACCELERATION_TERM_CONDUCTIVITY",
+    "ENERGY_NAMES",
     "Seepage",
     "ShearCell",
     "Simulation",
     "Specimen",
+    "__revision__",
     "__version__",
     "carries",
     "pm4sand_constants",
@@ -22,8 +24,10 @@ __all__ = [
     "stress_node_offset",
 ]
 
+__revision__: str
 __version__: str
 ACCELERATION_TERM_CONDUCTIVITY: float
+ENERGY_NAMES: list[str]
 
 def small_strain_moduli(
     material: dict[str, Any], stress: tuple[float, float, float, float]
@@ -105,6 +109,7 @@ class Simulation:
     def stress(self) -> NDArray[np.float64]: ...
     def strain(self) -> NDArray[np.float64]: ...
     def take_column_records(self) -> tuple[dict[str, Any] | None, dict[str, Any] | None]: ...
+    def take_energy(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
     def channel_names(self) -> list[str]: ...
     def finish_histories(self) -> None: ...
     def take_histories(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...

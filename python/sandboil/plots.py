@@ -128,6 +128,7 @@ def _shaking_figures(run: Run, reference: Reference | None, stage: str) -> dict[
     figures["column"] = column(run, stage=stage)
     if not run.scene.outline.is_level:
         figures["section"] = section(run, stage=stage)
+    figures["energy"] = energy(run, stage=stage)
     if run.scene.output.stress_paths and run.scene.output.depths:
         figures["stress_paths"] = stress_paths(run, reference=reference, stage=stage)
     return figures
@@ -337,6 +338,29 @@ def section(run: Run, *, stage: str | None = None) -> Figure:
     axes.set_title(f"displacement at {run.frame_times(stage)[-1]:.4g} s", loc="left", fontsize=9)
     # Above the frame: a section may fill any corner of it.
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=7)
+    return figure
+
+
+def energy(run: Run, *, stage: str | None = None) -> Figure:
+    """What energy came into the section, and where it went, over time; kinds that stay zero are left out."""
+    stage = _shaken_stage(run, stage)
+    history = run.energy(stage)
+    figure = Figure(figsize=(8.0, 4.5), layout="constrained")
+    axes = figure.subplots()
+    # Gravity's work and the stress at rest that carries it cancel, and would dwarf all else.
+    parts = {
+        "came in": history["base"] + history["sides"],
+        "motion": history["kinetic"],
+        "soil": history["stress"] - history["constant_forces"],
+        "pore water": history["water"],
+        "velocity filter and Rayleigh damping": history["damping"],
+        "local damping": history["local_damping"],
+    }
+    for (name, values), colour in zip(parts.items(), ("black", *_CONDITIONS), strict=True):
+        if np.any(values != 0.0):
+            axes.plot(history["time"], values, color=colour, label=name, lw=1.6 if name == "came in" else 1.0)
+    axes.set(xlabel="time, s", ylabel="energy, kJ per m", xlim=(0.0, history["time"][-1]))
+    axes.legend(loc="best")
     return figure
 
 

@@ -7,9 +7,11 @@ Layout of `results.h5` (format version in the root attributes; every dataset has
     /nodes            initial place, region and geostatic state of the nodes
     /probes           points of the histories
     /histories/STAGE  time (m,) and every channel (m, probes)
+    /energy/STAGE     time (m,), energy and work by kind, and mass of each phase (m,)
     /envelopes/STAGE  largest values over all steps, (nodes,)
     /motions/STAGE    the motion that shook the stage
     /stages/STAGE     attributes: steps, wall time, counters
+    /machine          attributes: what computed the run first
     /seepage          of a seepage stage: its last fields, discharge and inflow of every condition
     /scene            the scene as TOML with every default written out
 
@@ -23,6 +25,7 @@ import csv
 import importlib.metadata
 import json
 import os
+import platform
 import time
 import warnings
 from collections.abc import Iterator
@@ -46,6 +49,7 @@ from .motion._series import STANDARD_GRAVITY, butterworth
 from .plan import described_coefficient, pore_pressure_coefficients
 from .scene import Scene
 from .simulation import (
+    ENERGY,
     FIELDS,
     HISTORIES,
     SEEPAGE_FIELDS,
@@ -171,12 +175,19 @@ class Writer:
         root.attrs["format_version"] = FORMAT_VERSION
         root.attrs["sandboil_version"] = importlib.metadata.version("sandboil")
         root.attrs["core_version"] = _core.__version__
+        root.attrs["revision"] = _core.__revision__
         root.attrs["h5py_version"] = h5py.__version__
         root.attrs["numpy_version"] = np.__version__
         root.attrs["accuracy"] = accuracy
         root.attrs["status"] = "running"
         root.attrs["message"] = ""
         root.attrs["resumed"] = 0
+        machine = root.create_group("machine")
+        machine.attrs["threads"] = self._simulation.threads
+        machine.attrs["system"] = platform.platform()
+        machine.attrs["processor"] = _processor()
+        machine.attrs["processors"] = os.cpu_count() or 0
+        machine.attrs["python_version"] = platform.python_version()
         root.attrs["fingerprints"] = json.dumps(self._simulation.fingerprints)
         _text(root, "scene", [scene.to_toml(resolved=True)])
         for name, motion in zip(scene.stage_names, self._simulation.motions, strict=True):
@@ -291,6 +302,7 @@ class Writer:
         if frame and simulation.field_names == written_fields(simulation.scene):
             self._append_frame(wall_time)
         self._append_histories()
+        self._append_energy()
         for kept in simulation.scene.output.envelopes:
             values = simulation.envelope(kept)
             if values is not None:
@@ -359,6 +371,20 @@ class Writer:
         for name, values in histories.items():
             _append(self._file[place][name], values)
 
+    def _append_energy(self) -> None:
+        time, energy = self._simulation.take_energy()
+        if not energy:
+            return
+        place = f"energy/{self._simulation.stage}"
+        if place not in self._file:
+            group = self._file.create_group(place)
+            _growing(group, "time", (_ROWS_PER_CHUNK,), "s")
+            for name in energy:
+                dataset = _growing(group, name, (_ROWS_PER_CHUNK,), ENERGY[name].unit)
+                dataset.attrs["description"] = ENERGY[name].description
+        for name, values in {"time": time, **energy}.items():
+            _append(self._file[place][name], values)
+
     def close(self, status: Status, message: str = "") -> None:
         """Say how the run ended, commit and close the file."""
         self._file.attrs["status"] = status
@@ -370,6 +396,15 @@ class Writer:
         """Close the file as it was last committed, if it is open."""
         self._file.close()
         self._disk.close()
+
+
+def _processor() -> str:
+    """Name of the processor, as far as the system tells."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
 
 
 def holds(path: Path, mark: dict[str, Any]) -> bool:
@@ -518,6 +553,8 @@ class Run:
     fingerprints : what tells the scene from others, see :attr:`Simulation.fingerprints`
     accuracy : the preset asked for
     versions : of what wrote the file
+    revision : of the sources in git, with "+changes" if they had some; empty of a build outside a checkout
+    machine : what computed the run first: `threads`, `system`, `processor`, `processors`, `python_version`
     probes : points of the histories
     position : (n, 2) initial places of the nodes, m
     """
@@ -545,6 +582,8 @@ class Run:
             self.versions = {
                 name: file.attrs[f"{name}_version"] for name in ("sandboil", "core", "h5py", "numpy")
             }
+            self.revision: str = file.attrs.get("revision", "")
+            self.machine: dict[str, Any] = dict(file["machine"].attrs) if "machine" in file else {}
             labels, places = file["probes/label"].asstr()[:], file["probes/position"][:]
             self.probes = [Probe(label, *place) for label, place in zip(labels, places.tolist(), strict=True)]
             self.position: Floats = file["nodes/position"][:]
@@ -645,6 +684,25 @@ class Run:
             f"must be a point of the histories: {known}",
             "name it in output.depths or output.points and run again",
         )
+
+    def energy(self, stage: str | None = None) -> dict[str, Floats]:
+        """Energy (kJ/m) and mass (Mg/m) of the section over a stage of shaking: `time` (s) and by name.
+
+        ::
+
+            kinetic + stress + water + damping + local_damping
+                = kinetic at the beginning + constant_forces + base + sides + renewal
+
+        `sandboil.simulation.ENERGY` tells what each is. `damping` is what the forces of the skeleton take
+        beyond the work of its stress: without velocity filter and Rayleigh damping it is the error of the
+        balance. With corrected inertia it holds what that stores, with printed operators what they lose.
+        """
+        stage = self._stage(stage)
+        with self._open() as file:
+            group = file.get(f"energy/{stage}")
+            if group is None:
+                raise InvalidInput("stage", stage, "must be a shaking stage: only they have energies")
+            return {name: group[name][:] for name in ("time", *ENERGY)}
 
     def motion(self, stage: str | None = None) -> Motion | None:
         """The motion that shook the stage; None if it had none."""

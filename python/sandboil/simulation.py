@@ -119,6 +119,22 @@ STRESS_HISTORIES = (
 )
 
 
+# What is kept of energy and mass in a stage of shaking, in the core's order. Works count from its beginning.
+ENERGY: dict[str, Quantity] = {
+    "kinetic": Quantity("kJ/m", "kinetic energy"),
+    "stress": Quantity("kJ/m", "done on the soil by effective stress: stored, and lost in plasticity"),
+    "water": Quantity("kJ/m", "given to the pore water beyond its state at rest"),
+    "damping": Quantity("kJ/m", "taken by the velocity filter and Rayleigh damping"),
+    "local_damping": Quantity("kJ/m", "taken by local damping"),
+    "constant_forces": Quantity("kJ/m", "done by gravity and the reactions stored at rest"),
+    "base": Quantity("kJ/m", "brought in through the base, less what leaves there"),
+    "sides": Quantity("kJ/m", "brought in through free-field sides, less what leaves there"),
+    "renewal": Quantity("kJ/m", "kinetic energy gained where a renewed geometry changes masses"),
+    "solid_mass": Quantity("Mg/m", "mass of the grains"),
+    "water_mass": Quantity("Mg/m", "mass of water that fills the pores, as of the last geometry"),
+}
+
+
 def unknown_name(path: str, name: str, known: list[str]) -> InvalidInput:
     """The refusal of a name that is none of `known`, with the nearest right one."""
     meant = nearest_name(name, known)
@@ -164,6 +180,7 @@ class Simulation:
     scene : as given
     particles : the nodes and their geostatic state
     probes : where histories are taken
+    threads : that share the work
     motions : the motion of every stage, None where there is none; horizontal, and for all of the base
     doubts : why an answer may not be what was meant; each is also warned of as :class:`SandboilWarning`
 
@@ -197,7 +214,7 @@ class Simulation:
         if scene.seepage is not None and (columns is not None or keep_columns):
             name, value = ("columns", columns) if columns is not None else ("keep_columns", keep_columns)
             raise InvalidInput(name, value, "does not go with a seepage stage: columns follow from its water")
-        self._threads = threads
+        self.threads = threads
         self._stages = [
             _shaking_description(scene, stage, duration, waves, self.probes)
             if isinstance(stage, Shaking) and duration is not None and waves is not None
@@ -316,7 +333,7 @@ class Simulation:
         if self._water is not None:
             self.run_stage()
             section = self._with_water_of_seepage()
-        self._grains = _core.Simulation.restore(section, path, self._threads)
+        self._grains = _core.Simulation.restore(section, path, self.threads)
         self._index = index
 
     @cached_property
@@ -356,7 +373,7 @@ class Simulation:
             self._water = _core.Seepage(self._section, pressure, conditions, stage.duration)
             return
         if self._grains is None:
-            self._grains = _core.Simulation(self._with_water_of_seepage(), self._threads)
+            self._grains = _core.Simulation(self._with_water_of_seepage(), self.threads)
         if isinstance(stage, Gravity):
             self._grains.begin_gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
             return
@@ -510,6 +527,16 @@ class Simulation:
             histories[name] = factor * values[:, :, k] if len(time) else np.empty((0, len(self.probes)))
         return time, histories
 
+    def take_energy(self) -> tuple[Floats, dict[str, Floats]]:
+        """Energy and mass since the last call: times (m,) in s, and (m,) by name, as in `ENERGY`.
+
+        At the end of a step at every interval of the histories, not filtered. Empty outside a shaking stage.
+        """
+        if self._grains is None:
+            return np.empty(0), {}
+        time, values = self._grains.take_energy()
+        return time, dict(zip(_core.ENERGY_NAMES, values.T, strict=True)) if len(time) else {}
+
     def finish_histories(self) -> None:
         """Close the samples still collecting: the run ends here, before its stage does."""
         if self._grains is not None:
@@ -575,10 +602,17 @@ class Simulation:
         return dict(self._present.arrays())
 
     def counters(self) -> dict[str, int]:
-        """Work done since the scene was made, by kind."""
-        seepage = {} if self._water is None else self._water.counters()
-        grains = {} if self._grains is None else self._grains.counters()
-        return {f"seepage_{name}": count for name, count in seepage.items()} | grains
+        """Work done in the present stage, by kind: steps, calls, and every guard that acted.
+
+        `porosity_clips` counts porosities kept in the range of a packing, `pressure_floors` stresses held at
+        the soil's least pressure, `forced_acceptances` parts of a step taken at the smallest size although
+        their error was above the tolerance, `reversals` updates of a soil's reference stress, of which
+        `near_neutral_reversals` might fall otherwise with other steps. Seepage has its own, `seepage_...`.
+        """
+        if self._grains is not None:
+            return self._grains.counters()
+        assert self._water is not None
+        return {f"seepage_{name}": count for name, count in self._water.counters().items()}
 
 
 def written_fields(scene: Scene) -> list[str]:

@@ -26,6 +26,9 @@ mod _core {
     #[pymodule_init]
     fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {
         m.add("ACCELERATION_TERM_CONDUCTIVITY", sandboil_solver::ACCELERATION_TERM_CONDUCTIVITY)?;
+        m.add("ENERGY_NAMES", sandboil_solver::ENERGY_NAMES)?;
+        // Empty if it was built outside a checkout.
+        m.add("__revision__", env!("SANDBOIL_REVISION"))?;
         m.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -25,6 +25,9 @@ const STEPS_PER_LOOK: u64 = 32;
 /// Times and values of history samples.
 type Histories<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>);
 
+/// Times and values of samples of energy.
+type Energies<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>);
+
 pub fn get<'py, T>(dict: &Bound<'py, PyDict>, key: &str) -> PyResult<T>
 where
     T: for<'a> FromPyObject<'a, 'py>,
@@ -450,6 +453,13 @@ impl Simulation {
         };
         let [left, right] = self.inner.take_column_records();
         Ok([left.map(told).transpose()?, right.map(told).transpose()?])
+    }
+
+    /// Samples of energy and masses since the last call: times (m,) and values (m, names).
+    fn take_energy<'py>(&mut self, py: Python<'py>) -> PyResult<Energies<'py>> {
+        let (times, values) = self.inner.take_energy();
+        let shape = (times.len(), solver::ENERGY_NAMES.len());
+        Ok((times.to_pyarray(py), shaped(values, shape)?.to_pyarray(py)))
     }
 
     fn channel_names(&self) -> Vec<&'static str> {

@@ -194,6 +194,16 @@ impl Dashpots {
         }
     }
 
+    /// Work of the last step's tractions on velocities that have had all their forces, kJ/m.
+    pub fn work(&self, dt: f64, velocity: &[Vec2]) -> f64 {
+        let dashpots = self.all.iter().zip(&self.traction).zip(&self.before);
+        dashpots
+            .map(|((dashpot, traction), before)| {
+                traction * dashpot.length * 0.5 * (before + self.felt(dashpot, velocity)) * dt
+            })
+            .sum()
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let spread = self.spread.as_ref().map_or(0, Csr::bytes);

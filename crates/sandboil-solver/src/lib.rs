@@ -14,6 +14,7 @@ mod conduction;
 mod contacts;
 mod deformation;
 mod dispersion;
+mod energy;
 pub mod error;
 mod flow;
 mod free_field;
@@ -39,6 +40,7 @@ mod wetting;
 pub use base::{Base, BaseSegment, HalfSpace, Impedance, UpgoingWave, Vertical};
 pub use boundary::{Outline, Side, Support};
 pub use column::ColumnRecord;
+pub use energy::ENERGY_NAMES;
 pub use error::SolverError;
 pub use hydraulics::{HydraulicBoundary, HydraulicCondition, Series};
 pub use model::{

@@ -72,6 +72,14 @@ impl Phases {
         self.solid[node] * self.solid_density[node] + pores * self.water_density[node]
     }
 
+    /// Masses of all grains and of the water in all pores, Mg/m.
+    pub fn total_masses(&self) -> [f64; 2] {
+        (0..self.volume.len()).fold([0.0; 2], |[solid, water], node| {
+            let grains = self.solid[node] * self.solid_density[node];
+            [solid + grains, water + self.mass(node) - grains]
+        })
+    }
+
     /// Takes over the volume strain of the stress nodes. Returns how many porosities had to be kept in range.
     pub fn follow(&mut self, points: &[StressPoint]) -> u64 {
         let mut clipped = 0;

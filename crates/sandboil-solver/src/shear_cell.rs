@@ -449,7 +449,7 @@ impl ShearCell {
             (filter, dt),
             &self.test.numerics.integrator,
         );
-        let report = report.map_err(|error| match error.soil_divergence() {
+        let (report, _) = report.map_err(|error| match error.soil_divergence() {
             Some((quantity, node, value)) => self.diverged(quantity, node, value),
             None => error,
         })?;

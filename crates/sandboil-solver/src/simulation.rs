@@ -8,6 +8,7 @@ use crate::{
     contacts::Contacts,
     deformation::Deformation,
     dispersion::{Dispersion, lumped_masses},
+    energy::{Energy, EnergyHistory, StepWork},
     error::SolverError,
     flow::{Flow, FlowScheme, Ground},
     free_field::{FreeField, Section},
@@ -21,7 +22,7 @@ use crate::{
         NodalShare, PrintedStress, StressPoint, conservative_force, local_damping, maximum_shear_strain,
         motion,
     },
-    soil_field::SoilField,
+    soil_field::{SoilField, StressWork},
     state::{self, StateError},
     timestep::{Criterion, PressureCoupling, PressureSpectrum, region_limit},
     water_edges::MovingBoundary,
@@ -91,10 +92,10 @@ pub struct Shaking {
     pub strain_envelope: bool,
 }
 
-/// Work done, by kind: what a scene does not ask for stays zero.
+/// Work done in a stage, by kind: what a scene does not ask for stays zero.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Counters {
-    /// Steps of all stages.
+    /// Steps.
     pub steps: u64,
     /// Calls of the flow model.
     pub flow_calls: u64,
@@ -131,6 +132,10 @@ struct ActiveShaking {
     coupling: PressureCoupling,
     probes: Probes,
     recorder: Recorder,
+    energy: Energy,
+    energy_history: EnergyHistory,
+    /// Accelerations that the free-field sides give in a step, m/s2; none without them.
+    side_push: Vec<Vec2>,
     channel_values: Vec<f64>,
     pressure_envelope: Option<Vec<f64>>,
     strain_envelope: Option<Vec<f64>>,
@@ -140,6 +145,9 @@ struct ActiveShaking {
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct MotionSum {
     kinetic_energy: f64,
+    /// Work of the constant forces and of the water's, kJ/m.
+    constant_work: f64,
+    water_work: f64,
     acceleration: f64,
     largest_acceleration: f64,
 }
@@ -173,6 +181,8 @@ pub struct Simulation {
     shares: Vec<NodalShare>,
     soil: SoilField,
     constant_force: Vec<Vec2>,
+    /// Force of the pore water in the last step, kN/m.
+    water_force: Vec<Vec2>,
     spectrum: PressureSpectrum,
     flow: Option<Flow>,
     printed_stress: Option<PrintedStress>,
@@ -230,6 +240,7 @@ impl Simulation {
             points,
             soil,
             constant_force: vec![Vec2::zeros(); nodes],
+            water_force: vec![Vec2::zeros(); nodes],
             spectrum: PressureSpectrum::new(&model),
             flow: None,
             printed_stress: geometry.printed.as_ref().map(|_| PrintedStress::default()),
@@ -242,7 +253,7 @@ impl Simulation {
             step: 0,
             dt: 0.0,
             criterion: Criterion::default(),
-            counters: Counters { geometry_builds: 1, ..Counters::default() },
+            counters: Counters::default(),
             sums: vec![MotionSum::default(); chunks(nodes)],
             phases,
             model,
@@ -280,6 +291,7 @@ impl Simulation {
     /// # Errors
     /// Elastic constants outside their range.
     pub fn begin_gravity(&mut self, stage: Gravity) -> Result<(), SolverError> {
+        self.counters = Counters::default();
         self.gravity = Some(stage);
         self.released = None;
         // Statics know no waves, and the edges that they hold bring back the geometry and masses that they know.
@@ -346,6 +358,7 @@ impl Simulation {
                 expected: "left out beside free-field sides, whose push does not know of it",
             });
         }
+        self.counters = Counters::default();
         self.rayleigh = stage.rayleigh.map(|law| RayleighDamping::new(law, self.points.len()));
         let corrected = self.model.numerics.dispersion_correction;
         self.dispersion = corrected.then(|| Dispersion::new(&self.model, self.points.len()));
@@ -420,6 +433,13 @@ impl Simulation {
         let channels = stage.probes.len() * channel_names(self.flow.is_some(), stage.stress_histories).len();
         self.begin(Active::Shaking(Box::new(ActiveShaking {
             recorder: Recorder::new(channels, stage.history_interval, self.dt),
+            energy: Energy::new(self.kinetic_energy()),
+            energy_history: EnergyHistory::new(stage.history_interval),
+            side_push: if free_field.is_some() {
+                vec![Vec2::zeros(); self.model.nodes()]
+            } else {
+                Vec::new()
+            },
             channel_values: vec![0.0; channels],
             pressure_envelope: (stage.pressure_envelope && self.flow.is_some())
                 .then(|| vec![0.0; self.model.nodes()]),
@@ -463,7 +483,8 @@ impl Simulation {
     fn static_force(&mut self) -> Vec<Vec2> {
         self.refresh_shares(&vec![Vec2::zeros(); self.velocity.len()]);
         self.prepare_printed_stress();
-        (0..self.model.nodes()).map(|j| self.internal_force(j, Vec2::zeros())).collect()
+        let force = |j| self.internal_force(j, Vec2::zeros(), self.water_force(j));
+        (0..self.model.nodes()).map(force).collect()
     }
 
     /// Builds the geometry anew under way, and with it that of free-field columns. A strained lattice meets other
@@ -776,23 +797,28 @@ impl Simulation {
         }
     }
 
-    /// Force on node `j`, moving at `velocity`, from stress and excess pore pressure (Eq. 6), kN/m.
+    /// Force of the excess pore pressure on node `j` (Eq. 6), kN/m.
     #[inline]
-    fn internal_force(&self, j: usize, velocity: Vec2) -> Vec2 {
+    fn water_force(&self, j: usize) -> Vec2 {
+        let (Some(flow), Some(tables)) = (&self.flow, &self.geometry.flow) else { return Vec2::zeros() };
+        match &self.geometry.printed {
+            None => flow.force(tables, j),
+            Some(printed) => {
+                let row = printed.pressure_gradient.iter_row(j);
+                let gradient: Vec2 = row.map(|(i, gradient)| gradient * flow.neutral(i)).sum();
+                gradient * -self.phases.volume()[j]
+            }
+        }
+    }
+
+    /// Force on node `j`, moving at `velocity`, from stress and from excess pore pressure, `water` (Eq. 6), kN/m.
+    #[inline]
+    fn internal_force(&self, j: usize, velocity: Vec2, water: Vec2) -> Vec2 {
         let mut force = match (&self.printed_stress, &self.geometry.printed) {
             (Some(stress), Some(tables)) => stress.force(tables, j, &self.points, &self.phases),
             _ => conservative_force(&self.geometry, j, velocity, &self.shares, &self.points),
         };
-        if let (Some(flow), Some(tables)) = (&self.flow, &self.geometry.flow) {
-            match &self.geometry.printed {
-                None => force += flow.force(tables, j),
-                Some(printed) => {
-                    for (i, gradient) in printed.pressure_gradient.iter_row(j) {
-                        force -= gradient * (flow.neutral(i) * self.phases.volume()[j]);
-                    }
-                }
-            }
-        }
+        force += water;
         if let Some(rayleigh) = &self.rayleigh {
             force += rayleigh.force(&self.geometry, j, self.mass[j], velocity);
         }
@@ -865,34 +891,34 @@ impl Simulation {
         self.prepare_printed_stress();
         let mut velocity = std::mem::take(&mut self.velocity);
         let mut acceleration = std::mem::take(&mut self.acceleration);
+        let mut water_force = std::mem::take(&mut self.water_force);
         let mut sums = std::mem::take(&mut self.sums);
-        // A slice of nothing, which takes no memory: the loops write two arrays.
-        let mut unit = vec![(); self.model.nodes()];
         let threaded = self.threads > 1;
         let nodes = self.model.nodes();
         let mut dispersion = self.dispersion.take();
         // The constant force comes last, so that a state at rest cancels to the last bit.
-        let bare = |this: &Self, j: usize, velocity: Vec2| {
-            (this.internal_force(j, velocity) + this.constant_force[j]) / this.mass[j]
+        let bare = |this: &Self, j: usize, velocity: Vec2, water: &mut Vec2| {
+            *water = this.water_force(j);
+            (this.internal_force(j, velocity, *water) + this.constant_force[j]) / this.mass[j]
         };
         let this = &*self;
         if let Some(dispersion) = &mut dispersion {
-            let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: &mut unit };
+            let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: &mut water_force };
             for_each_chunk(threaded, rows, &mut sums, |first, rows, _| {
                 for (k, (v, a)) in rows.a.iter().zip(rows.b.iter_mut()).enumerate() {
-                    *a = bare(this, first + k, *v);
+                    *a = bare(this, first + k, *v, &mut rows.c[k]);
                 }
             });
             dispersion.gather(threaded, &this.geometry, &this.points, &acceleration);
         }
-        let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: &mut unit };
+        let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: &mut water_force };
         for_each_chunk(threaded, rows, &mut sums, |first, rows, sum| {
             *sum = MotionSum::default();
             for (k, (v, a)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
                 let j = first + k;
                 let mass = this.mass[j];
                 let acting = match &dispersion {
-                    None => bare(this, j, *v),
+                    None => bare(this, j, *v, &mut rows.c[k]),
                     Some(dispersion) => *a + dispersion.acceleration(&this.geometry, j, mass),
                 };
                 *a = acting;
@@ -906,21 +932,75 @@ impl Simulation {
         self.counters.inertia_corrections += u64::from(dispersion.is_some());
         self.dispersion = dispersion;
         (self.velocity, self.acceleration, self.sums) = (velocity, acceleration, sums);
+        self.water_force = water_force;
+    }
+
+    /// What a step did, after all its forces: kinetic energy, and the works of the constant forces and of the water.
+    fn step_work(&mut self, dt: f64) -> StepWork {
+        let mut sums = std::mem::take(&mut self.sums);
+        // Slices of nothing, which take no memory: the loop only reads.
+        let mut unit = [(); 3].map(|()| vec![(); self.model.nodes()]);
+        let [a, b, c] = &mut unit;
+        let this = &*self;
+        for_each_chunk(this.threads > 1, Rows { a, b, c }, &mut sums, |first, rows, sum| {
+            *sum = MotionSum::default();
+            for j in first..first + rows.a.len() {
+                let v = this.velocity[j];
+                let path = (v - this.acceleration[j] * (0.5 * dt)) * dt;
+                sum.kinetic_energy += 0.5 * this.mass[j] * v.norm_squared();
+                sum.constant_work += this.constant_force[j].dot(&path);
+                sum.water_work += this.water_force[j].dot(&path);
+            }
+        });
+        self.sums = sums;
+        let sum = self.motion_sum();
+        let (kinetic, constant, water) = (sum.kinetic_energy, sum.constant_work, sum.water_work);
+        StepWork { kinetic, constant, water, ..StepWork::default() }
+    }
+
+    /// Work of accelerations (m/s2) that were among those of the step, kJ/m.
+    fn work_of(&self, push: &[Vec2], dt: f64) -> f64 {
+        let motion = self.mass.iter().zip(&self.velocity).zip(&self.acceleration);
+        let work = |(((mass, v), a), push): (((&f64, &Vec2), &Vec2), &Vec2)| {
+            mass * push.dot(&(v - a * (0.5 * dt))) * dt
+        };
+        motion.zip(push).map(work).sum()
+    }
+
+    /// What the chunks of the velocity update found, added in order, whatever thread made them.
+    fn motion_sum(&self) -> MotionSum {
+        self.sums.iter().fold(MotionSum::default(), |total, chunk| MotionSum {
+            kinetic_energy: total.kinetic_energy + chunk.kinetic_energy,
+            constant_work: total.constant_work + chunk.constant_work,
+            water_work: total.water_work + chunk.water_work,
+            acceleration: total.acceleration + chunk.acceleration,
+            largest_acceleration: total.largest_acceleration.max(chunk.largest_acceleration),
+        })
+    }
+
+    /// Kinetic energy, kJ/m.
+    fn kinetic_energy(&self) -> f64 {
+        self.mass.iter().zip(&self.velocity).map(|(mass, v)| 0.5 * mass * v.norm_squared()).sum()
     }
 
     /// Local damping of Eq. 16 on the whole acceleration, the base's tractions included, against the velocity that
-    /// each node had before it.
-    fn damp_locally(&mut self, coefficient: f64, dt: f64) {
-        for (v, a) in self.velocity.iter_mut().zip(&mut self.acceleration) {
+    /// each node had before it. Returns the energy taken, kJ/m.
+    fn damp_locally(&mut self, coefficient: f64, dt: f64) -> f64 {
+        let mut taken = 0.0;
+        // The velocities lent behind the nodes have no mass here.
+        let masses = self.mass.iter().chain(std::iter::repeat(&0.0));
+        for ((v, a), mass) in self.velocity.iter_mut().zip(&mut self.acceleration).zip(masses) {
             let before = *v - *a * dt;
             let drag = local_damping(*a, before, coefficient);
             *v += drag * dt;
             *a += drag;
+            taken -= mass * drag.dot(&(before + *v)) * (0.5 * dt);
         }
+        taken
     }
 
     /// Strain, soil model and the shares of the next force loop, from the velocity at mid-step.
-    fn update_stress(&mut self, dt: f64) -> Result<(), SolverError> {
+    fn update_stress(&mut self, dt: f64) -> Result<StressWork, SolverError> {
         let filter = self.filter();
         let report = self.soil.step(
             self.threads > 1,
@@ -930,7 +1010,7 @@ impl Simulation {
             (filter, dt),
             &self.model.numerics.integrator,
         );
-        let report = report.map_err(|error| match error.soil_divergence() {
+        let (report, work) = report.map_err(|error| match error.soil_divergence() {
             Some((quantity, node, value)) => self.diverged(quantity, node, value),
             None => error,
         })?;
@@ -941,7 +1021,7 @@ impl Simulation {
         self.counters.soil.merge(&report);
         self.counters.plastic_updates += self.soil.plastic_points() as u64;
         self.counters.steps += 1;
-        Ok(())
+        Ok(work)
     }
 
     fn gravity_step(&mut self) -> Result<(), SolverError> {
@@ -950,12 +1030,7 @@ impl Simulation {
         // From rest the first kick of a leapfrog spans half a step; a whole one would let modes near the
         // stability limit flip for ever between two stops.
         self.accelerate(if kinetic_energy == 0.0 { 0.5 * dt } else { dt });
-        // Chunk sums are added in order, whatever thread made them.
-        let sum = self.sums.iter().fold(MotionSum::default(), |total, chunk| MotionSum {
-            kinetic_energy: total.kinetic_energy + chunk.kinetic_energy,
-            acceleration: total.acceleration + chunk.acceleration,
-            largest_acceleration: total.largest_acceleration.max(chunk.largest_acceleration),
-        });
+        let sum = self.motion_sum();
         let largest = sum.largest_acceleration / self.model.gravity;
         let mean = sum.acceleration / (self.model.gravity * self.model.nodes() as f64);
         self.check_finite("acceleration", |simulation, j| simulation.acceleration[j].norm(), f64::INFINITY)?;
@@ -1003,24 +1078,34 @@ impl Simulation {
         }
         self.accelerate(dt);
         let motion = (self.velocity.as_mut_slice(), self.acceleration.as_mut_slice());
+        let push = &mut shaking.side_push;
         if let Some(free_field) = &shaking.free_field {
+            push.iter_mut().zip(&*motion.1).for_each(|(push, a)| *push = -a);
             free_field.push(dt, &self.mass, motion.0, motion.1);
+            push.iter_mut().zip(&*motion.1).for_each(|(push, a)| *push += a);
         }
         shaking.base.end_step(self.time, dt, &self.mass, (&mut *motion.0, &mut *motion.1));
         if let Some(free_field) = &mut shaking.free_field {
+            push.iter_mut().zip(&*motion.1).for_each(|(push, a)| *push -= a);
             free_field.end_step(dt, &self.mass, motion.0, motion.1);
+            push.iter_mut().zip(&*motion.1).for_each(|(push, a)| *push += a);
             free_field.lend(&mut motion.0[self.mass.len()..], &mut motion.1[self.mass.len()..]);
             self.counters.free_field_calls += 1;
         }
+        let mut local_damping = 0.0;
         if shaking.stage.local_damping > 0.0 {
-            self.damp_locally(shaking.stage.local_damping, dt);
+            local_damping = self.damp_locally(shaking.stage.local_damping, dt);
         }
+        let base = shaking.base.dashpots().work(dt, &self.velocity);
+        let sides = self.work_of(&shaking.side_push, dt);
+        shaking.energy.step(&StepWork { base, sides, local_damping, ..self.step_work(dt) });
         self.counters.base_calls += 1;
         self.record(shaking);
         for (x, v) in self.position.iter_mut().zip(&self.velocity) {
             *x += v * dt;
         }
-        self.update_stress(dt)?;
+        let work = self.update_stress(dt)?;
+        shaking.energy.strain(work);
         if let (Some(flow), Some(tables)) = (&mut self.flow, &self.geometry.flow) {
             self.counters.flow_calls += 1;
             let (points, threaded) = (&self.points, self.threads > 1);
@@ -1031,7 +1116,9 @@ impl Simulation {
         }
         self.step += 1;
         self.time += dt;
-        if self.is_over(shaking) {
+        let is_over = self.is_over(shaking);
+        shaking.energy_history.offer(self.time, is_over, &shaking.energy, &self.phases);
+        if is_over {
             shaking.recorder.finish(self.time);
         }
         if self.step.is_multiple_of(CHECK_INTERVAL) {
@@ -1055,6 +1142,7 @@ impl Simulation {
         let column_strained = shaking.free_field.iter().flat_map(FreeField::columns).any(Self::is_strained);
         if !self.is_column && (self.is_strained() || column_strained) {
             self.renew_geometry(shaking.free_field.as_mut());
+            shaking.energy.renew(self.kinetic_energy());
         }
         Ok(())
     }
@@ -1255,7 +1343,7 @@ impl Simulation {
         }
     }
 
-    /// Work done so far.
+    /// Work done in the stage; the section's first geometry belongs to none.
     pub fn counters(&self) -> Counters {
         self.counters
     }
@@ -1407,6 +1495,14 @@ impl Simulation {
         let time = self.time;
         if let Active::Shaking(shaking) = &mut self.active {
             shaking.recorder.finish(time);
+        }
+    }
+
+    /// Samples of energy and masses since the last call: times (s) and one row of [`crate::ENERGY_NAMES`] for each.
+    pub fn take_energy(&mut self) -> (Vec<f64>, Vec<f64>) {
+        match &mut self.active {
+            Active::Shaking(shaking) => shaking.energy_history.take(),
+            _ => (Vec::new(), Vec::new()),
         }
     }
 

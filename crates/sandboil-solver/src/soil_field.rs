@@ -8,7 +8,7 @@ use crate::{
     skeleton::{NodalShare, StressPoint, motion},
 };
 use sandboil_soil::{
-    Integrator, Moduli, Soil, SoilError, SoilModel, StrainIncrement, UpdateReport, elastic::Elastic,
+    Integrator, Moduli, Soil, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport, elastic::Elastic,
     with_model,
 };
 use sandboil_sph::Vec2;
@@ -65,10 +65,37 @@ impl TryFrom<StoredLaw> for Law {
     }
 }
 
+/// Work of the effective stress in the strain of a step, kJ/m, with the stress before it and with the one after.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StressWork {
+    /// With the stress at the beginning of the step.
+    pub before: f64,
+    /// With the stress at its end.
+    pub after: f64,
+}
+
+impl StressWork {
+    /// Adds the work at a stress node that has been strained from the stress `before`.
+    #[inline]
+    fn add(&mut self, before: &Stress, point: &StressPoint, increment: &StrainIncrement) {
+        let volume = point.volume * point.deformation.volume_ratio();
+        let (xx, yy, xy) = (volume * increment.xx, volume * increment.yy, volume * increment.xy);
+        let work = |stress: &Stress| stress.xx * xx + stress.yy * yy + stress.xy * xy;
+        self.before += work(before);
+        self.after += work(&point.stress);
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.before += other.before;
+        self.after += other.after;
+    }
+}
+
 /// Outcome of one chunk of updates.
 #[derive(Debug, Clone, Default)]
 struct Outcome {
     report: UpdateReport,
+    work: StressWork,
     failure: Option<(usize, SoilError)>,
 }
 
@@ -154,7 +181,8 @@ impl<M: SoilModel> Plastic for Rowed<M> {
                         return;
                     }
                 }
-                point.stress = model.stress(state);
+                let before = std::mem::replace(&mut point.stress, model.stress(state));
+                outcome.work.add(&before, point, &increment);
                 set_moduli(point, model.moduli(state));
                 add_strain(point, &increment);
                 rows.b[k] = motion.share(point, geometry.covariance[s], filter);
@@ -263,7 +291,7 @@ impl SoilField {
     }
 
     /// Moves every stress node through one step: strain from the velocity field, stress from the soil model,
-    /// and the share that the force loop will gather.
+    /// and the share that the force loop will gather. Returns what the models counted and what the stress did.
     ///
     /// # Errors
     /// [`SolverError::Soil`] with the first node, in order, whose model failed.
@@ -275,8 +303,8 @@ impl SoilField {
         (points, shares): (&mut [StressPoint], &mut [NodalShare]),
         (filter, dt): (f64, f64),
         integrator: &Integrator,
-    ) -> Result<UpdateReport, SolverError> {
-        let mut total = UpdateReport::default();
+    ) -> Result<(UpdateReport, StressWork), SolverError> {
+        let (mut total, mut work) = (UpdateReport::default(), StressWork::default());
         for group in &mut self.groups {
             let first_row = group.rows.start;
             let used = chunks(group.rows.len());
@@ -287,12 +315,15 @@ impl SoilField {
                 Law::Elastic(elastic) => {
                     // A slice of nothing, which takes no memory: the loop writes two arrays.
                     let c = &mut vec![(); a.len()];
-                    for_each_chunk(threaded, Rows { a, b, c }, outcomes, |first, rows, _| {
+                    for_each_chunk(threaded, Rows { a, b, c }, outcomes, |first, rows, outcome| {
+                        *outcome = Outcome::default();
                         for (k, (point, share)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
                             let s = first_row + first + k;
                             let motion = motion(geometry, s, velocity);
                             let increment = motion.advance(&mut point.deformation, dt);
-                            point.stress = elastic.moved(&point.stress, &increment);
+                            let before = point.stress;
+                            point.stress = elastic.moved(&before, &increment);
+                            outcome.work.add(&before, point, &increment);
                             add_strain(point, &increment);
                             *share = motion.share(point, geometry.covariance[s], filter);
                         }
@@ -301,7 +332,7 @@ impl SoilField {
                 Law::Plastic(_, law) => {
                     let flowing = Flowing { geometry, velocity, filter, dt };
                     law.step(threaded, flowing, first_row, (a, b), outcomes, integrator);
-                    for outcome in outcomes.iter() {
+                    for outcome in &*outcomes {
                         if let Some((s, source)) = &outcome.failure {
                             let (region, node) = (group.region, s / STRESS_NODES);
                             return Err(SolverError::Soil { region, node, source: source.clone() });
@@ -310,8 +341,12 @@ impl SoilField {
                     }
                 }
             }
+            // In order, whatever thread made them.
+            for outcome in &*outcomes {
+                work.merge(&outcome.work);
+            }
         }
-        Ok(total)
+        Ok((total, work))
     }
 
     /// Void ratio at stress node `s`, if its model knows it.

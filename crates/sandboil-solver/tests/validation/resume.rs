@@ -147,7 +147,8 @@ fn a_stored_run_ends_with_the_same_bits() {
         simulation.begin_gravity(GRAVITY).unwrap();
         let whole = run(&case, simulation, 0, |stop| stops.push(stop));
         let (counters, expected) = (whole.counters(), stored(&whole));
-        assert!(counters.geometry_builds > 3, "{}: {counters:?}", case.name);
+        // The last stage begins with one, and renews it under way.
+        assert!(counters.geometry_builds > 1, "{}: {counters:?}", case.name);
         assert!(counters.soil.substeps > 0, "{}: {counters:?}", case.name);
         // Some of the stops, spread over all stages, in turn with these threads.
         let chosen = stops.iter().step_by(stops.len().div_ceil(6)).zip([2, 1, 3, 8].into_iter().cycle());

@@ -1,0 +1,89 @@
+"""Energy and mass of a shaken section: what comes in is what is held, stored, and lost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scenes
+from sandboil import Gravity, InvalidInput, Motion, Region, Run, Shaking, box, run
+from sandboil.simulation import ENERGY
+
+# What damping takes without filter and Rayleigh damping, over what came in at most: the error of the balance.
+# Works are second order in the strain of a step.
+CLOSURE = 1.0e-6
+
+TALL = [Region("rock", box(x=(0, 0.5), y=(0, 40)), scenes.ROCK, dry_unit_weight=20.0)]
+SHORT_PULSE = Motion.ricker(frequency=8.0, pga_g=0.1)
+
+
+def unfiltered(**changes: Any) -> dict[str, Any]:
+    return {"numerics": {"velocity_filter": 0.0}, **changes}
+
+
+def test_elastic_ground_holds_what_the_wave_brings_and_gives_it_back(tmp_path: Path) -> None:
+    """A short pulse is once all inside: the integral of rho Vs v^2 of the upgoing wave."""
+    stages = [Gravity(), Shaking(SHORT_PULSE, duration=1.2)]
+    results = run(scenes.dry_column(**unfiltered(spacing=0.5, regions=TALL, stages=stages)), tmp_path)
+    energy = results.energy()
+    dt, velocity = SHORT_PULSE.upgoing_velocity()
+    impedance = np.sqrt(scenes.ROCK.shear_modulus * 20.0 / 9.81)
+    brought = 0.5 * impedance * float(np.sum(velocity**2)) * dt
+    held = energy["kinetic"] + energy["stress"] - energy["constant_forces"]
+    assert held.max() == pytest.approx(brought, rel=0.01)
+    assert energy["base"].max() == pytest.approx(brought, rel=0.01)
+    assert abs(energy["base"][-1]) < 0.01 * brought
+    assert np.abs(energy["damping"]).max() < CLOSURE * brought
+    for name in ("water", "local_damping", "sides", "renewal"):
+        assert not energy[name].any(), name
+
+
+def test_the_balance_closes_in_liquefying_sand(tmp_path: Path) -> None:
+    energy = run(scenes.column(**unfiltered()), tmp_path).energy()
+    assert np.abs(energy["damping"]).max() < CLOSURE * energy["base"].max()
+    lost = energy["stress"][-1] - energy["constant_forces"][-1] + energy["water"][-1]
+    assert lost > 0.2 * energy["base"].max()
+
+
+def test_the_parts_add_up_and_damping_only_takes(finished: Run) -> None:
+    energy = finished.energy()
+    assert set(energy) == {"time", *ENERGY}
+    spent = sum(energy[name] for name in ("kinetic", "stress", "water", "damping", "local_damping"))
+    given = sum(energy[name] for name in ("constant_forces", "base", "sides", "renewal"))
+    np.testing.assert_allclose(spent, given, atol=1e-9 * np.abs(energy["stress"]).max())
+    assert energy["damping"][-1] > 0.0
+    assert np.diff(energy["damping"]).min() > -CLOSURE * energy["base"].max()
+    # At every interval of the histories, the last step included.
+    assert energy["time"][-1] == finished.times[-1]
+    np.testing.assert_allclose(np.diff(energy["time"])[:-1], 0.005, atol=1e-3)
+
+
+def test_grains_keep_their_mass(finished: Run) -> None:
+    energy = finished.energy()
+    solid = finished.scene.regions[0].Gs * 10.0 / 9.81
+    porosities = [region.resolved(finished.scene).porosity for region in finished.scene.regions]
+    assert energy["solid_mass"][0] == pytest.approx(sum((1.0 - n) * solid for n in porosities), rel=1e-12)
+    assert (energy["solid_mass"] == energy["solid_mass"][0]).all()
+    # Gravity has strained the ground by less than a millionth.
+    assert energy["water_mass"][0] == pytest.approx(sum(porosities) * 10.0 / 9.81, rel=1e-6)
+
+
+def test_local_damping_is_told_apart(tmp_path: Path) -> None:
+    energy = run(scenes.dry_column(numerics={"local_damping": 0.05}), tmp_path).energy()
+    assert (np.diff(energy["local_damping"]) >= 0.0).all()
+    assert energy["local_damping"][-1] > 0.0
+
+
+def test_only_shaking_has_energies(finished: Run) -> None:
+    with pytest.raises(InvalidInput, match="only they have energies"):
+        finished.energy("gravity")
+
+
+def test_counts_are_those_of_their_stage(finished: Run) -> None:
+    summary = finished.summary()
+    for stage in ("gravity", "shaking"):
+        assert summary[stage]["counts"]["steps"] == summary[stage]["steps"]
+    assert summary["gravity"]["counts"]["plastic_updates"] == 0
+    assert summary["shaking"]["counts"]["reversals"] > 0
