@@ -170,7 +170,7 @@ def test_a_target_out_of_reach_is_warned_of():
         (lambda: lab.calibrate_hpo(0.55, 677.0, 0.147, hpo=0.4), "lab.calibration.hpo"),
         (lambda: lab.calibrate_hpo(0.55, 677.0, 0.147, secondary={}), "lab.calibration.secondary"),
         (lambda: lab.calibrate_hpo(55.0, 677.0, 0.147), "material.Dr"),
-        (lambda: lab.calibrate_hpo(0.55, 677.0, 0.147, K0=9.0), "lab.cyclic_dss.K0"),
+        (lambda: lab.calibrate_hpo(0.55, 677.0, 0.147, K0=9.0), "lab.calibration.K0"),
         (lambda: lab.crr(sand(TABLE_1[0]), gamma_sa=0.03, r_u=0.9), "lab.criterion"),
         (lambda: lab.crr(sand(TABLE_1[0]), cycles=math.nan), "lab.crr.cycles"),
         (lambda: lab.crr_curve(sand(TABLE_1[0]), csr=[]), "lab.crr_curve.csr"),

@@ -137,7 +137,7 @@ def test_an_unwritable_folder_is_refused(scene_file: Path, tmp_path: Path) -> No
 
 def test_a_motion_that_cannot_be_read_is_refused(scene_file: Path, tmp_path: Path) -> None:
     none = tmp_path / "none.AT2"
-    assert "cannot be read" in refused("run", scene_file, "--out", tmp_path / "out", "--motion", none)
+    assert "must be a readable record" in refused("run", scene_file, "--out", tmp_path / "out", "--motion", none)
     assert "belongs to a --motion" in refused("plan", scene_file, "--unit", "g")
     assert not (tmp_path / "out").exists()
 
@@ -188,7 +188,7 @@ def test_a_run_that_cannot_write_exits_with_3_and_resumes(tmp_path: Path, finish
         text=True,
         timeout=120,
         check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (280_000, 280_000)),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (180_000, 180_000)),
     )
     assert (limited.returncode, limited.stdout) == (STOPPED, "")
     told = limited.stderr.replace("\n", " ")
@@ -336,7 +336,7 @@ def test_slips_in_the_laboratory_are_refused(tmp_path: Path) -> None:
     done = called("lab", "dss", *SAND, "--csr", 0.3, "--out", out)
     assert (done.returncode, "must be writable" in done.stderr) == (INVALID, True)
     stress0 = ("--stress0", -50, -100, 0)
-    assert "must be a CSV" in refused("lab", "strain-path", path, *stress0, *SAND)
+    assert "must be a readable CSV" in refused("lab", "strain-path", path, *stress0, *SAND)
     path.write_text("eps_xx,eps_yy\n0,0\n")
     assert "must have a column gamma_xy" in refused("lab", "strain-path", path, *stress0, *SAND)
 
@@ -368,7 +368,7 @@ def test_motion_convert_scales_filters_and_changes_the_form(record: Path, tmp_pa
     assert called("motion", "convert", record, "--out", out, "--pga", 0.2, "--high", 20).returncode == DONE
     expected = Motion.from_csv(record).filtered(high=20.0).scaled(pga_g=0.2)
     np.testing.assert_allclose(Motion.from_at2(out).acceleration_g, expected.acceleration_g, atol=1e-7)
-    assert "must end in .AT2 or .csv" in refused("motion", "convert", record, "--out", tmp_path / "x.txt")
+    assert "must end in .at2, .csv" in refused("motion", "convert", record, "--out", tmp_path / "x.txt")
     assert "must be stated" in refused("motion", "info", unitless(tmp_path))
 
 

@@ -108,12 +108,12 @@ def test_a_folder_without_sound_columns_is_refused(kept: sb.Run, tmp_path: Path)
     with pytest.raises(InvalidInput, match=r"has no free_field\.h5"):
         sb.run(ground(), tmp_path / "out", columns=tmp_path)
     (tmp_path / FILE_NAME).write_bytes(b"no HDF5")
-    with pytest.raises(InvalidInput, match="must hold a sound"):
+    with pytest.raises(InvalidInput, match="must be a sound file"):
         sb.run(ground(), tmp_path / "out", columns=tmp_path)
     (tmp_path / FILE_NAME).write_bytes((kept.path.parent / FILE_NAME).read_bytes())
     with h5py.File(tmp_path / FILE_NAME, "a") as file:
         del file["shaking/left/values"]
-    with pytest.raises(InvalidInput, match="must hold a sound"):
+    with pytest.raises(InvalidInput, match="must be a sound file"):
         sb.run(ground(), tmp_path / "out", columns=tmp_path)
 
 

@@ -291,7 +291,7 @@ def test_files_are_bounded_in_size(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("sandboil.motion._files.MAX_SAMPLES", 2)
     with pytest.raises(InvalidInput, match=r"m\.csv, line 4 = 3: at most 2 points"):
         Motion.from_csv(path, unit="g")
-    monkeypatch.setattr("sandboil.motion._files.MAX_FILE_BYTES", 10)
+    monkeypatch.setattr("sandboil._input_file.MAX_FILE_BYTES", 10)
     with pytest.raises(InvalidInput, match="must not exceed 10 bytes"):
         Motion.from_csv(path, unit="g")
 

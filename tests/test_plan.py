@@ -114,7 +114,7 @@ def test_a_plan_writes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_what_a_run_refuses_a_plan_refuses(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="cannot be read"):
+    with pytest.raises(InvalidInput, match="must be a readable"):
         scenes.column(stages=[Gravity(), Shaking({"file": str(tmp_path / "none.AT2")})]).plan()
     with pytest.raises(InvalidInput, match="threads"):
         plan_module.plan(scenes.column(), threads=0)

@@ -239,7 +239,7 @@ def test_a_folder_without_rights_is_refused(tmp_path: Path) -> None:
 
 def test_a_motion_that_cannot_be_read_is_refused_and_leaves_no_folder(tmp_path: Path) -> None:
     scene = scenes.column(stages=[Gravity(), Shaking({"file": str(tmp_path / "none.AT2")})])
-    with pytest.raises(InvalidInput, match="cannot be read"):
+    with pytest.raises(InvalidInput, match="must be a readable"):
         run(scene, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

@@ -14,6 +14,7 @@ from ._errors import (
     SandboilError,
     SandboilWarning,
     SimulationDiverged,
+    SuctionWarning,
 )
 from ._motion_spec import MotionSpec
 from .boundaries import BaseSegment, CompliantBase, Fixed, FreeField, Periodic, Roller, Sides
@@ -104,6 +105,7 @@ __all__ = [
     "SimulationDiverged",
     "SiteLayer",
     "SiteProfile",
+    "SuctionWarning",
     "Summary",
     "Surface",
     "TotalStress",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +13,9 @@ import typer
 from numpy.typing import NDArray
 
 from . import _toml, lab
+from ._cli_out import picture_to_write, to_write
 from ._errors import InvalidInput, SandboilError
+from ._input_file import read_text
 from ._style import DPI
 from .discretise import Floats
 from .lab._arguments import Integrator
@@ -34,11 +37,11 @@ K0Option = Annotated[float, typer.Option("--K0", help="Horizontal over vertical 
 BiasOption = Annotated[float, typer.Option(help="Static shear stress over sigma_v0.")]
 VoidRatioOption = Annotated[float | None, typer.Option(help="At the start; default the soil's own.")]
 IntegratorOption = Annotated[Integrator, typer.Option(help="Of rate-type models.")]
-PlotOption = Annotated[Path | None, typer.Option(help="Picture, PNG, PDF or SVG.")]
+PlotOption = Annotated[Path | None, typer.Option(help="Picture, PNG, PDF or SVG.", callback=picture_to_write)]
 StopOption = Annotated[float, typer.Option(help="Shear strain that ends a cyclic test.")]
 MaxCyclesOption = Annotated[int, typer.Option(help="Cycles that end a cyclic test.")]
 CyclesOption = Annotated[float, typer.Option(help="Uniform cycles, counted by halves.")]
-OutOption = Annotated[Path | None, typer.Option(help="CSV for the record.")]
+OutOption = Annotated[Path | None, typer.Option(help="CSV for the record.", callback=to_write)]
 
 # Levels that the summary of a cyclic test counts cycles to.
 _LEVELS = (
@@ -90,7 +93,12 @@ def dss(
     }
     tested = soil_of(soil, Dr=Dr, G0=G0, hpo=hpo)
     if monotonic == (csr is not None):
-        raise InvalidInput("--csr", csr, "must be given for a cyclic test, and not with --monotonic")
+        raise InvalidInput(
+            "--csr",
+            csr,
+            "must be given for a cyclic test, and not with --monotonic",
+            "for example --csr 0.15, or --monotonic alone",
+        )
     test: lab.ShearTest
     if csr is None:
         test = lab.monotonic_dss(tested, gamma_max=gamma_max, **common)
@@ -232,7 +240,8 @@ def calibrate(
     void_ratio: VoidRatioOption = None,
     integrator: IntegratorOption = "default",
     out: Annotated[
-        Path | None, typer.Option(help="TOML for the material, as a scene and --soil take it.")
+        Path | None,
+        typer.Option(help="TOML for the material, as a scene and --soil take it.", callback=to_write),
     ] = None,
     plot: PlotOption = None,
 ) -> None:
@@ -244,7 +253,12 @@ def calibrate(
     asked: dict[str, Any] = estimated | given
     for name in ("Dr", "G0", "crr"):
         if name not in asked:
-            raise InvalidInput(f"--{name}", None, "is required unless --spt or --cpt says it")
+            raise InvalidInput(
+                f"--{name}",
+                None,
+                "is required unless --spt or --cpt says it",
+                f"add --{name}, or a field test",
+            )
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always", lab.CalibrationWarning)
         result = lab.calibration(
@@ -308,14 +322,20 @@ def crr(
 
 def _strains(path: Path) -> Floats:
     names = ("eps_xx", "eps_yy", "gamma_xy")
+    text = read_text(path, "PATH", "CSV file")
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = list(csv.DictReader(file))
+        rows = list(csv.DictReader(io.StringIO(text, newline="")))
         return np.array([[float(row[name]) for name in names] for row in rows])
     except KeyError as error:
-        raise InvalidInput("PATH", str(path), f"must have a column {error.args[0]}") from error
-    except (OSError, ValueError, TypeError) as error:
-        raise InvalidInput("PATH", str(path), f"must be a CSV of numbers below a header: {error}") from error
+        told, found = f"must have a column {error.args[0]}", text.partition("\n")[0]
+        raise InvalidInput("PATH", str(path), told, f"its header is {found!r}") from error
+    except (csv.Error, ValueError, TypeError) as error:
+        raise InvalidInput(
+            "PATH",
+            str(path),
+            f"must be a CSV of numbers below a header: {error}",
+            f"columns {', '.join(names)}",
+        ) from error
 
 
 def _csv(columns: dict[str, NDArray[Any]]) -> str:
@@ -333,14 +353,16 @@ def _draw(path: Path, figure: Figure) -> None:
     try:
         figure.savefig(path, dpi=DPI)
     except (OSError, ValueError) as error:
-        raise InvalidInput("--plot", str(path), f"must be a writable picture: {error}") from error
+        raise InvalidInput("--plot", str(path), f"must be writable: {error}", "name another file") from error
 
 
 def _write_text(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise InvalidInput("--out", str(path), f"must be writable: {error.strerror}") from error
+        raise InvalidInput(
+            "--out", str(path), f"must be writable: {error.strerror}", "name another file"
+        ) from error
 
 
 def _stop_if_incomplete(test: lab.ShearTest | lab.PathTest) -> None:

@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterable
 
 # Similarity below which a suggestion would rather puzzle than help (difflib ratio, 0 to 1).
 _NEAREST_CUTOFF = 0.5
+# Longest name compared with others, characters: no name of ours is longer, and comparing takes their product.
+_LONGEST_NAME = 100
+
+# How much of a refused value is told: a few lines, whatever a file may hold.
+_SHOWN = reprlib.Repr()
+_SHOWN.maxlist = _SHOWN.maxtuple = _SHOWN.maxdict = 12
+_SHOWN.maxstring = _SHOWN.maxlong = 120
+# Longest part of a message, characters: a text of a user's file may stand in it.
+_SHOWN.maxother = _LONGEST_PART = 600
+
+
+def _cut(text: str) -> str:
+    """A text without its middle if it is very long."""
+    half = _LONGEST_PART // 2
+    return text if len(text) <= _LONGEST_PART else f"{text[:half]} ... {text[-half:]}"
 
 
 class SandboilError(Exception):
@@ -32,8 +48,8 @@ class InvalidInput(SandboilError, ValueError):
         self.hint = hint
 
     def __str__(self) -> str:
-        message = f"{self.path} = {self.value!r}: {self.allowed}"
-        return f"{message}; {self.hint}" if self.hint else message
+        message = f"{_cut(self.path)} = {_cut(_SHOWN.repr(self.value))}: {_cut(self.allowed)}"
+        return f"{message}; {_cut(self.hint)}" if self.hint else message
 
 
 class SimulationDiverged(SandboilError):
@@ -82,6 +98,10 @@ class SandboilWarning(UserWarning):
     """An answer that may not be what was meant: the text says why, and what would mend it."""
 
 
+class SuctionWarning(SandboilWarning):
+    """Seepage left a suction in soil that does not say what it holds then: the text says where."""
+
+
 class ResumeWarning(UserWarning):
     """A run that is gone on with found something damaged or missing: the text says what, and what it took."""
 
@@ -93,5 +113,5 @@ class RunInterrupted(SandboilError):
 def nearest_name(name: str, candidates: Iterable[str]) -> str | None:
     """The candidate most similar to `name` regardless of case, or None if nothing comes near."""
     by_lower = {candidate.lower(): candidate for candidate in candidates}
-    found = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=_NEAREST_CUTOFF)
+    found = difflib.get_close_matches(name[:_LONGEST_NAME].lower(), by_lower, n=1, cutoff=_NEAREST_CUTOFF)
     return by_lower[found[0]] if found else None

@@ -14,22 +14,30 @@ from pydantic_core import ErrorDetails
 
 from ._errors import InvalidInput, nearest_name
 
+# What is told, and how it is mended, of what is refused by a check of ours within pydantic's.
+_NO_NUMBER = "must be a number; write it without quotes, for example 0.5"
+
 
 def as_float(value: object) -> float:
     """Take any real number (numpy's too), but no text and no truth value: those are slips."""
     if isinstance(value, (bool, str, bytes)) or not hasattr(value, "__float__"):
-        raise ValueError("must be a number")
+        raise ValueError(_NO_NUMBER)
     try:
         return float(value)
     except (TypeError, OverflowError):
         # An array of several numbers, or an integer beyond all floats.
-        raise ValueError("must be a number") from None
+        raise ValueError(_NO_NUMBER) from None
 
 
 def _as_list(value: object) -> object:
     """Let numpy arrays stand where lists may."""
     return value.tolist() if hasattr(value, "tolist") else value
 
+
+# Most regions, stages, conditions and the like of a scene, and most points of a line: far beyond any section
+# that is drawn by hand, and few enough that each may be compared with each in seconds.
+MAX_PARTS = 200
+MAX_POINTS = 5000
 
 Number = Annotated[float, BeforeValidator(as_float)]
 
@@ -67,7 +75,10 @@ class Model(BaseModel):
         ]:
             if name in kwargs:
                 raise InvalidInput(
-                    f"{self._label}.{name}", kwargs[name], f"was given twice, also as {value!r}"
+                    f"{self._label}.{name}",
+                    kwargs[name],
+                    f"was given twice, also as {value!r}",
+                    "leave one of them out",
                 )
             kwargs[name] = value
         try:
@@ -110,40 +121,72 @@ class Model(BaseModel):
         if kind == "extra_forbidden":
             known = cls._keys()
             meant = _meant(location[0], missing) or _meant(location[0], known)
-            return InvalidInput(path, value, f"unknown key, known are {', '.join(known)}", meant)
+            told = f"unknown key, known are {', '.join(known)}"
+            return InvalidInput(path, value, told, meant or "leave it out, or take one of these")
         if kind == "missing":
-            return InvalidInput(path, None, f"is required{_described(field)}", remedy)
+            return InvalidInput(path, None, f"is required{_described(field)}", remedy or f"add {location[0]}")
         if kind == "literal_error":
             names = _literals(field)
-            return InvalidInput(
-                path, value, f"must be one of {', '.join(map(repr, names))}", _meant(value, names) or remedy
-            )
+            meant = _meant(value, names) or remedy or f"for example {names[0]!r}"
+            return InvalidInput(path, value, f"must be one of {', '.join(map(repr, names))}", meant)
         if kind in ("union_tag_invalid", "union_tag_not_found"):
             names = _tags(field)
             tag = context.get("tag")
             key = str(context["discriminator"]).strip("'")
             if tag is None:
-                return InvalidInput(
-                    path, value, f"needs {key} = one of {', '.join(map(repr, names))}", remedy
-                )
+                told = f"needs {key} = one of {', '.join(map(repr, names))}"
+                return InvalidInput(path, value, told, remedy or f"add {key} = {names[0]!r}, or another")
             return InvalidInput(
                 f"{path}.{key}",
                 tag,
                 f"must be one of {', '.join(map(repr, names))}",
-                _meant(tag, names) or remedy,
+                _meant(tag, names) or remedy or f"for example {names[0]!r}",
             )
         if kind == "finite_number":
-            return InvalidInput(path, value, f"must be finite{_described(field)}", remedy)
+            told = f"must be finite{_described(field)}"
+            return InvalidInput(path, value, told, remedy or "find out where it comes from")
         if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
-            return InvalidInput(path, value, _range(field) + _described(field), remedy)
+            told = _range(field)
+            return InvalidInput(
+                path, value, told + _described(field), remedy or "check its unit and its sign"
+            )
         if kind in ("model_type", "model_attributes_type"):
             name = context.get("class_name")
+            told = f"must be {f'a {name}' if name else 'an object of sandboil'} or a table"
+            return InvalidInput(path, value, told, remedy or "give the object itself, or its keys and values")
+        if kind in _COUNTS:
+            told = _COUNTS[kind].format(**{"actual_length": "none", **context})
             return InvalidInput(
-                path, value, f"must be {f'a {name}' if name else 'an object of sandboil'} or a table"
+                path, value, told + _described(field), remedy or "check its commas and brackets"
+            )
+        if kind in _KINDS:
+            told, usual = _KINDS[kind]
+            return InvalidInput(path, value, told + _described(field), remedy or usual)
+        if cause is not None and not remedy:
+            told, _, remedy = str(cause).partition("; ")
+            return InvalidInput(
+                path, value, told + _described(field), remedy or "write it as its description says"
             )
         allowed = str(cause) if cause is not None else detail["msg"]
-        return InvalidInput(path, value, allowed + _described(field), remedy)
+        return InvalidInput(path, value, allowed.partition("; ")[0] + _described(field), remedy)
 
+
+# What pydantic says of lengths, in our words.
+_COUNTS = {
+    "too_short": "must hold at least {min_length}, not {actual_length}",
+    "too_long": "must hold at most {max_length}, not {actual_length}",
+    "string_too_short": "must have a character at least",
+}
+# What it says of kinds, with what is usually the matter.
+_KINDS = {
+    "bool_type": ("must be true or false", "write it without quotes"),
+    "int_type": ("must be a whole number", "write it without a point and without quotes"),
+    "int_from_float": ("must be a whole number", "write it without a point"),
+    "string_type": ("must be text", "write it in quotes"),
+    "tuple_type": ("must be a list", "write it in brackets, for example [0.0, 1.0]"),
+    "list_type": ("must be a list", "write it in brackets, for example [0.0, 1.0]"),
+    "dict_type": ("must be a table", "write its keys and values"),
+}
 
 _NAME_CHARACTERS = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_"
 
@@ -241,7 +284,15 @@ def checked(owner: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
         def checking(*args: _P.args, **kwargs: _P.kwargs) -> _R:
             valid = arguments()(*args, **kwargs)
             given = {name: getattr(valid, name) for name in type(valid).model_fields}
-            return typing.cast(Callable[..., _R], function)(**given)
+            try:
+                return typing.cast(Callable[..., _R], function)(**given)
+            except InvalidInput as error:
+                # What one function refuses of what another one hands it is told as the other one's.
+                inner, _, argument = error.path.removeprefix(f"{owner}.").partition(".")
+                if f"{owner}.{inner}.{argument}" != error.path or argument.partition("[")[0] not in given:
+                    raise
+                path = f"{owner}.{function.__name__}.{argument}"
+                raise InvalidInput(path, error.value, error.allowed, error.hint) from None
 
         return checking
 

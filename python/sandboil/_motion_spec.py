@@ -31,7 +31,11 @@ class MotionSpec(Model):
     column: Annotated[int, Field(strict=True, ge=0)] | str | None = None
     synthetic: dict[str, int | Number] | None = None
     ricker: dict[str, int | Number] | None = None
-    dt: Positive | None = Field(default=None, description="time between samples, s")
+    dt: Positive | None = Field(
+        default=None,
+        description="time between samples, s",
+        json_schema_extra={"remedy": "in seconds, for example 0.005"},
+    )
     acceleration_g: Many[Number] | None = None
     velocity: Many[Number] | None = Field(default=None, description="m/s")
     kind: Literal["outcrop", "within", "upgoing"] = "outcrop"
@@ -55,11 +59,13 @@ class MotionSpec(Model):
                     f"{generator}.{name}",
                     value,
                     f"unknown key, known are {', '.join(known)}",
-                    f"did you mean {meant!r}?" if meant else None,
+                    f"did you mean {meant!r}?" if meant else "leave it out, or take one of these",
                 )
         for name, parameter in known.items():
             if parameter.default is inspect.Parameter.empty and name not in said:
-                raise InvalidInput(f"{generator}.{name}", None, "is required")
+                raise InvalidInput(
+                    f"{generator}.{name}", None, "is required", f"see Motion.{generator} for what it takes"
+                )
         defaults = {name: parameter.default for name, parameter in known.items()}
         complete = defaults | said
         return {name: complete[name] for name in known if complete[name] is not None}
@@ -69,10 +75,20 @@ class MotionSpec(Model):
         sources = ("file", "synthetic", "ricker", "acceleration_g", "velocity")
         given = [name for name in sources if getattr(self, name) is not None]
         if len(given) != 1:
-            raise InvalidInput("motion", given, f"must have exactly one source of {', '.join(sources)}")
+            raise InvalidInput(
+                "motion",
+                given,
+                f"must have exactly one source of {', '.join(sources)}",
+                "for example file = 'record.AT2'",
+            )
         source = given[0]
         if (self.dt is not None) != (source in ("acceleration_g", "velocity")):
-            raise InvalidInput("motion.dt", self.dt, "goes with acceleration_g or velocity, and they with it")
+            raise InvalidInput(
+                "motion.dt",
+                self.dt,
+                "goes with acceleration_g or velocity, and they with it",
+                "a file and a generator have their own; samples take it in s, for example 0.005",
+            )
         return self
 
     @classmethod

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -9,24 +10,37 @@ from typing import Any
 import tomli_w
 
 from ._errors import InvalidInput
+from ._input_file import read_text
+
+# Most parts of a dotted key: a scene's have six at most, and the parser's memory grows with their square.
+MAX_KEY_PARTS = 16
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+_DEEP_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_KEY_PARTS}}}")
 
 
 def read(path: Path, label: str) -> str:
     """The text of a file; :class:`InvalidInput` under `label` if there is none."""
-    try:
-        # A byte order mark, as some editors write it, is no part of the text.
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise InvalidInput(label, str(path), f"must be a readable TOML file: {reason}") from error
+    return read_text(path, label, "TOML file")
 
 
 def parse(text: str, label: str, origin: str) -> dict[str, Any]:
     """The table that a text from `origin` holds; :class:`InvalidInput` under `label` if it is no TOML."""
+    if found := _DEEP_KEY.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise InvalidInput(
+            label, origin, f"must have keys of at most {MAX_KEY_PARTS} parts (at line {line})", "write tables"
+        )
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InvalidInput(label, origin, f"must be TOML: {error}") from error
+    except RecursionError as error:
+        raise InvalidInput(
+            label, origin, "must not nest lists and tables so deeply", "close the brackets"
+        ) from error
+    except ValueError as error:
+        # A TOMLDecodeError, or an integer of more digits than Python takes.
+        raise InvalidInput(
+            label, origin, f"must be TOML: {error}", "for example spacing = 0.5, or [water] above its keys"
+        ) from error
 
 
 def text(table: dict[str, Any]) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from ._errors import InvalidInput
-from ._model import Many, Model, Number
+from ._model import MAX_PARTS, Many, Model, Number
 from ._motion_spec import GivenMotion, MotionSpec
 from .materials import NonNegative, Positive
 
@@ -94,7 +94,9 @@ class BaseSegment(Model):
     _positional: ClassVar[tuple[str, ...]] = ("x",)
 
     x: Point = Field(description="left and right, m")
-    delay: NonNegative = Field(default=0.0, description="s")
+    delay: NonNegative = Field(
+        default=0.0, description="s", json_schema_extra={"remedy": "count from the stage's beginning"}
+    )
     motion: GivenMotion = None
 
     if TYPE_CHECKING:
@@ -154,14 +156,25 @@ class CompliantBase(Model):
     """
 
     _label: ClassVar[str] = "base"
+    _positional: ClassVar[tuple[str, ...]] = ("Vs", "density")
 
     kind: Literal["compliant"] = "compliant"
-    Vs: Positive | None = Field(default=None, description="shear wave velocity, m/s")
-    density: Positive | None = Field(default=None, description="Mg/m3")
-    Vp: Positive | None = Field(default=None, description="compression wave velocity, m/s")
+    Vs: Positive | None = Field(
+        default=None,
+        description="shear wave velocity, m/s",
+        json_schema_extra={"remedy": "rock has 300 to 3000"},
+    )
+    density: Positive | None = Field(
+        default=None, description="Mg/m3", json_schema_extra={"remedy": "2100 kg/m3 is written 2.1"}
+    )
+    Vp: Positive | None = Field(
+        default=None,
+        description="compression wave velocity, m/s",
+        json_schema_extra={"remedy": "Vp = Vs sqrt((2 - 2 nu)/(1 - 2 nu))"},
+    )
     vertical: Literal["roller", "absorbing"] | None = None
     apparent_velocity: Number | None = Field(default=None, description="along the base, m/s")
-    segments: Many[BaseSegment] = ()
+    segments: Annotated[Many[BaseSegment], Field(max_length=MAX_PARTS)] = ()
 
     if TYPE_CHECKING:
 
@@ -183,6 +196,7 @@ class CompliantBase(Model):
                 "base",
                 {"Vs": self.Vs, "density": self.density},
                 "must have both Vs and density, or neither: then the soil at the base gives its own",
+                "rock of 400 m/s has about 2.1 Mg/m3",
             )
         if self.Vp is None:
             return self
@@ -191,6 +205,7 @@ class CompliantBase(Model):
                 "base.Vp",
                 self.Vp,
                 "goes with Vs and density: without them the soil at the base gives its own",
+                "give them too, or leave Vp out",
             )
         if self.Vp < LEAST_SPEED_RATIO * self.Vs:
             raise InvalidInput(

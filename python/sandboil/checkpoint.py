@@ -17,6 +17,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
 from . import _core
 from ._committed_file import sync_folder
 from ._errors import DamagedState, InvalidInput, ResumeWarning
@@ -70,6 +72,15 @@ class Stored:
     note: Note
 
 
+def refuse_intervals(seconds: float | None, interval: float | None) -> None:
+    """Refuse times between states, as of :class:`Keeper`, that are none."""
+    for name, value in (("checkpoint_seconds", seconds), ("checkpoint_time", interval)):
+        if value is not None and not 0.0 < value < math.inf:
+            raise InvalidInput(
+                name, value, "must be a positive time in s, or None", "300 loses five minutes at most"
+            )
+
+
 class Keeper:
     """Stores the states of a run as it goes.
 
@@ -92,9 +103,6 @@ class Keeper:
         seconds: float | None,
         interval: float | None,
     ) -> None:
-        for name, value in (("checkpoint_seconds", seconds), ("checkpoint_time", interval)):
-            if value is not None and not 0.0 < value < math.inf:
-                raise InvalidInput(name, value, "must be a positive time in s, or None")
         self._folder = folder / FOLDER_NAME
         self._simulation = simulation
         self._seconds = math.inf if seconds is None else seconds
@@ -174,19 +182,29 @@ def stored(folder: Path) -> list[Stored]:
 
 def at_end_of(folder: Path, stage: str) -> Stored:
     """The state at the end of a stage of the run in `folder`; :class:`InvalidInput` if there is none."""
-    path = folder / FOLDER_NAME / f"{stage}{_SUFFIX}"
-    if not path.is_file():
-        ends = sorted(p.stem for p in path.parent.glob(f"*{_SUFFIX}") if not p.stem.isdecimal())
+    states = (folder / FOLDER_NAME).glob(f"*{_SUFFIX}")
+    ends = {path.stem: path for path in sorted(states) if not path.stem.isdecimal()}
+    if stage not in ends:
         raise InvalidInput(
             "start",
             (os.fspath(folder), stage),
             f"must be a run and a stage that it has ended: {', '.join(ends) or 'there is none'}",
+            "let that run come to the end of the stage first",
         )
-    return Stored(path, _note(path))
+    return Stored(ends[stage], _note(ends[stage]))
+
+
+_NOTES = TypeAdapter(Note)
 
 
 def _note(path: Path) -> Note:
-    return Note(**json.loads(_core.stored_note(path)))
+    """The note of a stored state; :class:`DamagedState` if it is not as we write it."""
+    try:
+        return _NOTES.validate_json(_core.stored_note(path), strict=True)
+    except ValidationError as error:
+        detail = error.errors()[0]
+        place = ".".join(map(str, detail["loc"])) or "its note"
+        raise DamagedState(f"{path} is damaged: {place}: {detail['msg']}") from error
 
 
 def refuse_other_run(folder: Path, own: dict[str, str], theirs: dict[str, str]) -> None:

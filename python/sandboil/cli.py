@@ -11,7 +11,15 @@ from typing import Annotated, TextIO
 import typer
 
 from . import _cli_lab, checkpoint
-from ._errors import InvalidInput, ResumeWarning, RunInterrupted, SandboilError, SandboilWarning
+from ._cli_out import motion_to_write
+from ._errors import (
+    InvalidInput,
+    ResumeWarning,
+    RunInterrupted,
+    SandboilError,
+    SandboilWarning,
+    SuctionWarning,
+)
 from .motion import Kind, Motion
 from .plan import plan as plan_of
 from .results import FILE_NAME, load
@@ -49,7 +57,7 @@ ColumnOption = Annotated[str | None, typer.Option(help="Column of a CSV, by its 
 ThreadsOption = Annotated[int, typer.Option(help="Threads; the results do not depend on their number.")]
 AccuracyOption = Annotated[Accuracy, typer.Option(help="Fills the numerics that the scene leaves open.")]
 MotionFile = Annotated[Path, typer.Argument(help="Record: PEER .AT2, or CSV with a header.", metavar="FILE")]
-MotionOut = Annotated[Path, typer.Option(help="File to write, .AT2 or .csv.")]
+MotionOut = Annotated[Path, typer.Option(help="File to write, .AT2 or .csv.", callback=motion_to_write)]
 KindOption = Annotated[Kind, typer.Option(help="Where the motion is one of.")]
 
 
@@ -111,7 +119,8 @@ def run(
         with warnings.catch_warnings():
             # They are told above, before the run's long time.
             warnings.simplefilter("ignore", SandboilWarning)
-            warnings.simplefilter("always", ResumeWarning)
+            for told_later in (ResumeWarning, SuctionWarning):
+                warnings.simplefilter("always", told_later)
             warnings.showwarning = _tell
             results = run_scene(
                 said,
@@ -242,10 +251,8 @@ def deconvolve(
 
 def _write(motion: Motion, out: Path) -> None:
     """Write a motion in the form that the file's ending tells."""
-    writers = {".at2": motion.write_at2, ".csv": motion.write_csv}
-    if out.suffix.lower() not in writers:
-        raise InvalidInput("--out", str(out), "must end in .AT2 or .csv: the ending chooses the form")
-    writers[out.suffix.lower()](out)
+    write = motion.write_at2 if out.suffix.lower() == ".at2" else motion.write_csv
+    write(out)
 
 
 def main() -> None:

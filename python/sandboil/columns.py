@@ -20,6 +20,7 @@ from . import _core
 from ._committed_file import sync_folder
 from ._errors import InvalidInput
 from ._fingerprint import fingerprint
+from ._hdf5 import LAYOUT, opened, refuse_foreign, said, text
 
 Floats = NDArray[np.float64]
 
@@ -118,15 +119,15 @@ def save(folder: Path, stage: str, hand: str, fingerprint: str, record: ColumnRe
     part = path.with_suffix(".part")
     if path.exists():
         shutil.copyfile(path, part)
-    with h5py.File(part, "a" if path.exists() else "w") as file:
+    with h5py.File(part, "a" if path.exists() else "w", libver=LAYOUT) as file:
         if f"{stage}/{hand}" in file:
             del file[f"{stage}/{hand}"]
         group = file.create_group(f"{stage}/{hand}")
-        group.attrs["key"] = fingerprint
+        group.attrs["key"] = text(fingerprint)
         group.attrs["interval_s"] = record.interval
         group.attrs["wet"] = record.wet
-        group.create_dataset("impedance", data=record.impedance)
-        group.create_dataset("values", data=record.values, compression="gzip", shuffle=True)
+        group.create_dataset("impedance", data=record.impedance, fletcher32=True)
+        group.create_dataset("values", data=record.values, compression="gzip", shuffle=True, fletcher32=True)
     part.replace(path)
     sync_folder(folder)
 
@@ -147,24 +148,22 @@ def load(
             "run that scene with keep_columns=True",
         )
     found = {}
-    try:
-        with h5py.File(path, "r") as file:
-            for stage, hand, fingerprint in fingerprints:
-                group = file.get(f"{stage}/{hand}")
-                if group is None or group.attrs["key"] != fingerprint:
-                    told = "no column" if group is None else "a column of other ground, motion or numerics"
-                    raise InvalidInput(
-                        "columns",
-                        str(folder),
-                        f"must hold the scene's own columns, but has {told} on the {hand} in {stage!r}",
-                        "leave columns out: they are then solved, which takes a few per cent of a run",
-                    )
-                found[stage, hand] = ColumnRecord(
-                    float(group.attrs["interval_s"]),
-                    np.asarray(group["impedance"][()], dtype=np.float64),
-                    bool(group.attrs["wet"]),
-                    np.asarray(group["values"][()], dtype=np.float64),
+    with opened(path, "columns") as file:
+        refuse_foreign(file, "columns")
+        for stage, hand, fingerprint in fingerprints:
+            group = file.get(f"{stage}/{hand}")
+            if group is None or said(group.attrs["key"]) != fingerprint:
+                told = "no column" if group is None else "a column of other ground, motion or numerics"
+                raise InvalidInput(
+                    "columns",
+                    str(folder),
+                    f"must hold the scene's own columns, but has {told} on the {hand} in {stage!r}",
+                    "leave columns out: they are then solved, which takes a few per cent of a run",
                 )
-    except (OSError, KeyError) as error:
-        raise InvalidInput("columns", str(folder), f"must hold a sound {FILE_NAME}: {error}") from error
+            found[stage, hand] = ColumnRecord(
+                float(group.attrs["interval_s"]),
+                np.asarray(group["impedance"][()], dtype=np.float64),
+                bool(group.attrs["wet"]),
+                np.asarray(group["values"][()], dtype=np.float64),
+            )
     return found

@@ -13,11 +13,16 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
+from pydantic.config import JsonDict
 
 from ._errors import InvalidInput
-from ._model import Many, Model, Number, as_float
+from ._model import MAX_PARTS, MAX_POINTS, Many, Model, Number, as_float
 from .boundaries import COORDINATE_TOLERANCE, Point
 from .materials import NonNegative, Positive
+
+_LAYERS: JsonDict = {"remedy": "layered soils have several times less across their layers, but not none"}
+_SERIES: JsonDict = {"remedy": "a number, or pairs of time and value as [[0, 4.0], [3600, 3.0]]"}
+_LINE: JsonDict = {"remedy": "'surface', or points as [[0, 0], [0, 4]]"}
 
 Edge = Literal["surface", "base", "left", "right"]
 EDGES: tuple[Edge, ...] = ("surface", "base", "left", "right")
@@ -59,6 +64,8 @@ def _line(value: object) -> object:
     rows: Any = value.tolist() if hasattr(value, "tolist") else value
     if not isinstance(rows, Sequence) or len(rows) < 2:
         raise ValueError(f"must be one of {', '.join(map(repr, EDGES))}, or at least two points (x, y)")
+    if len(rows) > MAX_POINTS:
+        raise ValueError(f"must hold at most {MAX_POINTS} points")
     points = []
     for row in rows:
         if not isinstance(row, Sequence) or isinstance(row, str) or len(row) != 2:
@@ -80,10 +87,14 @@ class Conductivity(Model):
     _label: ClassVar[str] = "hydraulic_conductivity"
     _positional: ClassVar[tuple[str, ...]] = ("horizontal", "vertical")
 
-    horizontal: Positive = Field(description="along the layers, m/s")
-    vertical: Positive = Field(description="across them, m/s")
+    horizontal: Positive = Field(description="along the layers, m/s", json_schema_extra=_LAYERS)
+    vertical: Positive = Field(description="across them, m/s", json_schema_extra=_LAYERS)
     angle_deg: Number = Field(
-        default=0.0, ge=-90.0, le=90.0, description="inclination of the layers, degrees"
+        default=0.0,
+        ge=-90.0,
+        le=90.0,
+        description="inclination of the layers, degrees",
+        json_schema_extra={"remedy": "positive where they rise to the right"},
     )
 
     if TYPE_CHECKING:
@@ -125,9 +136,26 @@ class VanGenuchten(Model):
         description="1/m, about the inverse of the capillary rise",
         json_schema_extra={"remedy": "tables in 1/cm: times 100; in 1/kPa: times the unit weight of water"},
     )
-    n: Number = Field(gt=1.0, le=20.0, description="steepness")
-    residual_saturation: Number = Field(default=0.0, ge=0.0, lt=1.0, description="at great suction")
-    full_saturation: Number = Field(default=1.0, gt=0.0, le=1.0, description="without suction")
+    n: Number = Field(
+        gt=1.0,
+        le=20.0,
+        description="steepness",
+        json_schema_extra={"remedy": "2.7 for sand, 1.9 for sandy loam, 1.1 for clay"},
+    )
+    residual_saturation: Number = Field(
+        default=0.0,
+        ge=0.0,
+        lt=1.0,
+        description="at great suction",
+        json_schema_extra={"remedy": "a share of the pores: 0.05 to 0.1 for sand"},
+    )
+    full_saturation: Number = Field(
+        default=1.0,
+        gt=0.0,
+        le=1.0,
+        description="without suction",
+        json_schema_extra={"remedy": "a share of the pores: 1, less with trapped air"},
+    )
 
     if TYPE_CHECKING:
 
@@ -142,6 +170,7 @@ class VanGenuchten(Model):
                 "retention.residual_saturation",
                 self.residual_saturation,
                 f"must be below full_saturation, {self.full_saturation:g}",
+                "0.05 to 0.1 for sand",
             )
         return self
 
@@ -155,7 +184,7 @@ class _Condition(Model):
     _label: ClassVar[str] = "condition"
     _positional: ClassVar[tuple[str, ...]] = ("on",)
 
-    on: Line = Field(description="an edge by name, or points (x, y) along one")
+    on: Line = Field(description="an edge by name, or points (x, y) along one", json_schema_extra=_LINE)
     x: Point | None = Field(default=None, description="the part of it between two x, m")
 
     @model_validator(mode="after")
@@ -175,7 +204,7 @@ class Head(_Condition):
     """Total head h_p + y on a stretch of edge, m."""
 
     kind: Literal["head"] = "head"
-    head: Series = Field(description="m")
+    head: Series = Field(description="m", json_schema_extra=_SERIES)
 
     if TYPE_CHECKING:
 
@@ -186,7 +215,7 @@ class Pressure(_Condition):
     """Pore pressure on a stretch of edge, kPa, compression positive."""
 
     kind: Literal["pressure"] = "pressure"
-    pressure: Series = Field(description="kPa")
+    pressure: Series = Field(description="kPa", json_schema_extra=_SERIES)
 
     if TYPE_CHECKING:
 
@@ -197,7 +226,7 @@ class Flux(_Condition):
     """Inflow through a stretch of edge, m/s; negative draws water out, whatever the soil holds."""
 
     kind: Literal["flux"] = "flux"
-    inflow: Series = Field(description="m/s, inwards")
+    inflow: Series = Field(description="m/s, inwards", json_schema_extra=_SERIES)
 
     if TYPE_CHECKING:
 
@@ -208,7 +237,7 @@ class Rain(_Condition):
     """Rain on a stretch of surface, m/s per horizontal area. What the soil does not take runs off."""
 
     kind: Literal["rain"] = "rain"
-    rate: Series = Field(description="m/s; 10 mm/h is 2.8e-6")
+    rate: Series = Field(description="m/s; 10 mm/h is 2.8e-6", json_schema_extra=_SERIES)
 
     if TYPE_CHECKING:
 
@@ -232,7 +261,7 @@ class Reservoir(_Condition):
     """Open water before a stretch of edge: its head below the `level` (m), a seepage face above it."""
 
     kind: Literal["reservoir"] = "reservoir"
-    level: Series = Field(description="elevation of the water, m")
+    level: Series = Field(description="elevation of the water, m", json_schema_extra=_SERIES)
 
     if TYPE_CHECKING:
 
@@ -256,7 +285,7 @@ class Drain(Model):
     _positional: ClassVar[tuple[str, ...]] = ("points",)
 
     kind: Literal["drain"] = "drain"
-    points: Many[Point] = Field(min_length=2, description="(x, y) along the drain, m")
+    points: Many[Point] = Field(min_length=2, max_length=MAX_POINTS, description="(x, y) along the drain, m")
 
     if TYPE_CHECKING:
 
@@ -267,7 +296,10 @@ class Drain(Model):
         for i, (before, after) in enumerate(itertools.pairwise(self.points)):
             if dist(before, after) <= COORDINATE_TOLERANCE:
                 raise InvalidInput(
-                    f"condition.points[{i + 1}]", after, "must lie apart from the point before it"
+                    f"condition.points[{i + 1}]",
+                    after,
+                    "must lie apart from the point before it",
+                    "leave one of the two out",
                 )
         return self
 
@@ -343,8 +375,16 @@ class Seepage(Model):
     _positional: ClassVar[tuple[str, ...]] = ("conditions",)
 
     kind: Literal["seepage"] = "seepage"
-    conditions: Many[Condition] = Field(min_length=1)
-    duration: Positive | None = Field(default=None, description="s; none: to the steady state")
+    conditions: Many[Condition] = Field(
+        min_length=1,
+        max_length=MAX_PARTS,
+        json_schema_extra={"remedy": "for example Head('left', head=4.0) and SeepageFace('right')"},
+    )
+    duration: Positive | None = Field(
+        default=None,
+        description="s; none: to the steady state",
+        json_schema_extra={"remedy": "86400 is a day; leave it out for the steady state"},
+    )
 
     if TYPE_CHECKING:
 

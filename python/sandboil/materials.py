@@ -24,6 +24,9 @@ _COHESION: JsonDict = {
 _TENSION: JsonDict = {"remedy": "leave it out for the apex c/tan(phi), 0 for soil that bears no tension"}
 _SOFTENING: JsonDict = {"remedy": "a shear strain, not a percentage: 5 % is written 0.05"}
 _EXPONENT: JsonDict = {"remedy": "about 0.5 for sand; 0 is Elastic"}
+_MODULUS: JsonDict = {"remedy": "soils have 1e4 to 1e6 kPa; 50 MPa is written 5e4"}
+_RESIDUAL_PART: JsonDict = {"remedy": "at most the peak's; leave it out to keep that"}
+_SECONDARY: JsonDict = {"remedy": "leave it out for the model's own"}
 _UNDRAINED: JsonDict = {"remedy": "for strength that grows with pressure take DruckerPrager or MohrCoulomb"}
 _RESIDUAL: JsonDict = {"remedy": "leave it out for strength that stays"}
 # Largest void ratio of any soil that carries load; above it the entry is a slip of units.
@@ -54,39 +57,77 @@ class PM4Sand(Model):
 
     kind: Literal["pm4sand"] = "pm4sand"
     Dr: Number = Field(gt=0.0, le=1.0, description="relative density, fraction", json_schema_extra=_FRACTION)
-    G0: Number = Field(gt=0.0, description="shear modulus coefficient")
-    hpo: Number = Field(gt=0.0, description="contraction rate")
-    p_atm: Positive | None = Field(default=None, description="atmospheric pressure, kPa; default 101.3")
-    ho: Positive | None = Field(default=None, description="ratio of plastic to elastic modulus")
-    e_max: Annotated[Number, Field(gt=0.0, le=_VOID_RATIO_MAX)] | None = Field(
-        default=None, description="largest void ratio; default 0.8"
+    G0: Number = Field(
+        gt=0.0,
+        description="shear modulus coefficient",
+        json_schema_extra={"remedy": "400 to 1000: 167 sqrt((N1)60cs + 2.5)"},
     )
-    e_min: Positive | None = Field(default=None, description="smallest void ratio; default 0.5")
-    nb: NonNegative | None = Field(default=None, description="bounding surface exponent; default 0.5")
-    nd: NonNegative | None = Field(default=None, description="dilatancy surface exponent; default 0.1")
-    Ado: Positive | None = Field(default=None, description="dilatancy scale")
-    z_max: NonNegative | None = Field(default=None, description="fabric limit")
-    cz: NonNegative | None = Field(default=None, description="fabric growth rate; default 250")
-    ce: NonNegative | None = Field(default=None, description="strain accumulation rate after liquefaction")
+    hpo: Number = Field(
+        gt=0.0,
+        description="contraction rate",
+        json_schema_extra={"remedy": "0.1 to 2; sb.lab.calibrate_hpo finds it from a cyclic resistance"},
+    )
+    p_atm: Positive | None = Field(
+        default=None, description="atmospheric pressure, kPa; default 101.3", json_schema_extra=_SECONDARY
+    )
+    ho: Positive | None = Field(
+        default=None, description="ratio of plastic to elastic modulus", json_schema_extra=_SECONDARY
+    )
+    e_max: Annotated[Number, Field(gt=0.0, le=_VOID_RATIO_MAX)] | None = Field(
+        default=None, description="largest void ratio; default 0.8", json_schema_extra=_SECONDARY
+    )
+    e_min: Positive | None = Field(
+        default=None, description="smallest void ratio; default 0.5", json_schema_extra=_SECONDARY
+    )
+    nb: NonNegative | None = Field(
+        default=None, description="bounding surface exponent; default 0.5", json_schema_extra=_SECONDARY
+    )
+    nd: NonNegative | None = Field(
+        default=None, description="dilatancy surface exponent; default 0.1", json_schema_extra=_SECONDARY
+    )
+    Ado: Positive | None = Field(default=None, description="dilatancy scale", json_schema_extra=_SECONDARY)
+    z_max: NonNegative | None = Field(default=None, description="fabric limit", json_schema_extra=_SECONDARY)
+    cz: NonNegative | None = Field(
+        default=None, description="fabric growth rate; default 250", json_schema_extra=_SECONDARY
+    )
+    ce: NonNegative | None = Field(
+        default=None, description="strain accumulation rate after liquefaction", json_schema_extra=_SECONDARY
+    )
     phi_cv: Annotated[Number, Field(gt=0.0, le=_PHI_CV_MAX)] | None = Field(
-        default=None, description="critical-state friction angle, degrees; default 33"
+        default=None,
+        description="critical-state friction angle, degrees; default 33",
+        json_schema_extra=_SECONDARY,
     )
     nu: Annotated[Number, Field(ge=0.0, lt=0.5)] | None = Field(
         default=None, description="Poisson's ratio; default 0.3", json_schema_extra=_NU
     )
     C_GD: Annotated[Number, Field(ge=1.0)] | None = Field(
-        default=None, description="degradation of elastic moduli with fabric; default 2"
+        default=None,
+        description="degradation of elastic moduli with fabric; default 2",
+        json_schema_extra=_SECONDARY,
     )
-    C_DR: NonNegative | None = Field(default=None, description="rotated dilatancy surface")
-    C_kaf: NonNegative | None = Field(default=None, description="sustained static shear")
-    Q: Positive | None = Field(default=None, description="Bolton's Q; default 10")
-    R: Positive | None = Field(default=None, description="Bolton's R; default 1.5")
-    m: Positive | None = Field(default=None, description="yield surface radius; default 0.01")
+    C_DR: NonNegative | None = Field(
+        default=None, description="rotated dilatancy surface", json_schema_extra=_SECONDARY
+    )
+    C_kaf: NonNegative | None = Field(
+        default=None, description="sustained static shear", json_schema_extra=_SECONDARY
+    )
+    Q: Positive | None = Field(
+        default=None, description="Bolton's Q; default 10", json_schema_extra=_SECONDARY
+    )
+    R: Positive | None = Field(
+        default=None, description="Bolton's R; default 1.5", json_schema_extra=_SECONDARY
+    )
+    m: Positive | None = Field(
+        default=None, description="yield surface radius; default 0.01", json_schema_extra=_SECONDARY
+    )
     F_sed_min: Annotated[Number, Field(gt=0.0, le=1.0)] | None = Field(
-        default=None, description="floor of the post-shaking stiffness factor"
+        default=None, description="floor of the post-shaking stiffness factor", json_schema_extra=_SECONDARY
     )
     p_sed_o: Positive | None = Field(
-        default=None, description="post-shaking pressure scale, kPa; default p_atm/5"
+        default=None,
+        description="post-shaking pressure scale, kPa; default p_atm/5",
+        json_schema_extra=_SECONDARY,
     )
 
     # Void ratio limits when none are given (PM4Sand manual; they only turn void ratio into Dr).
@@ -163,9 +204,9 @@ class _Skeleton(Model):
     _label: ClassVar[str] = "material"
 
     kind: str
-    G: Positive | None = Field(default=None, description="shear modulus, kPa")
-    K: Positive | None = Field(default=None, description="bulk modulus, kPa")
-    E: Positive | None = Field(default=None, description="Young's modulus, kPa")
+    G: Positive | None = Field(default=None, description="shear modulus, kPa", json_schema_extra=_MODULUS)
+    K: Positive | None = Field(default=None, description="bulk modulus, kPa", json_schema_extra=_MODULUS)
+    E: Positive | None = Field(default=None, description="Young's modulus, kPa", json_schema_extra=_MODULUS)
     nu: Annotated[Number, Field(ge=0.0, lt=0.5)] | None = Field(
         default=None, description="Poisson's ratio", json_schema_extra=_NU
     )
@@ -178,6 +219,7 @@ class _Skeleton(Model):
                 "material",
                 {name: getattr(self, name) for name in sorted(given)},
                 "must be given by exactly one pair: G and K, or E and nu",
+                "E = 2 G (1 + nu), K = E/(3 (1 - 2 nu))",
             )
         return self
 
@@ -239,7 +281,11 @@ class PressureElastic(_Skeleton):
     exponent: Number = Field(
         default=0.5, ge=0.0, le=1.0, description="exponent of pressure", json_schema_extra=_EXPONENT
     )
-    p_ref: Positive = Field(default=101.3, description="pressure at which the moduli are given, kPa")
+    p_ref: Positive = Field(
+        default=101.3,
+        description="pressure at which the moduli are given, kPa",
+        json_schema_extra={"remedy": "101.3 is one atmosphere"},
+    )
 
     if TYPE_CHECKING:
 
@@ -322,9 +368,11 @@ class DruckerPrager(_Frictional):
 
     kind: Literal["drucker_prager"] = "drucker_prager"
     matching: Literal["usual", "general"] = "usual"
-    c_residual: NonNegative | None = Field(default=None, description="cohesion after softening, kPa")
+    c_residual: NonNegative | None = Field(
+        default=None, description="cohesion after softening, kPa", json_schema_extra=_RESIDUAL_PART
+    )
     phi_residual: NonNegative | None = Field(
-        default=None, description="friction angle after softening, degrees"
+        default=None, description="friction angle after softening, degrees", json_schema_extra=_RESIDUAL_PART
     )
     psi_residual: NonNegative | None = Field(
         default=None, description="dilation angle after softening, degrees", json_schema_extra=_DILATION

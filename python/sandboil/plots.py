@@ -6,6 +6,7 @@ laid over them; the columns are told in :class:`Reference`.
 
 from __future__ import annotations
 
+import io
 import math
 import os
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from matplotlib.patches import Polygon as Patch
 from matplotlib.ticker import MaxNLocator
 
 from ._errors import InvalidInput
+from ._input_file import read_text
 from ._style import DPI, INPUT, OURS, REFERENCE, STYLE
 from .discretise import Floats
 from .hydraulics import described
@@ -72,16 +74,21 @@ class Reference:
 
 
 def _table(path: Path) -> dict[str, Floats]:
+    header, _, rows = read_text(path, "reference", "CSV file").partition("\n")
+    names = header.strip().split(",")
     try:
-        with path.open(encoding="utf-8") as file:
-            names = file.readline().strip().split(",")
-            values = np.loadtxt(file, delimiter=",", ndmin=2)
-    except (OSError, ValueError) as error:
+        values = np.loadtxt(io.StringIO(rows), delimiter=",", ndmin=2) if rows.strip() else np.empty((0, 0))
+    except ValueError as error:
         raise InvalidInput(
-            "reference", str(path), f"must be a CSV of numbers below a header: {error}"
+            "reference", str(path), f"must be a CSV of numbers below a header: {error}", "see plots.Reference"
         ) from error
     if values.shape[1] != len(names):
-        raise InvalidInput("reference", str(path), f"must have {len(names)} columns as its header has")
+        raise InvalidInput(
+            "reference",
+            str(path),
+            f"must have {len(names)} columns as its header has, not {values.shape[1]}",
+            "see plots.Reference",
+        )
     return dict(zip(names, values.T, strict=True))
 
 

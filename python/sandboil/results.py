@@ -33,7 +33,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import h5py
 import numpy as np
@@ -42,9 +42,10 @@ import numpy.typing as npt
 from . import _core
 from ._committed_file import CommittedFile, twin_of
 from ._errors import InvalidInput, ResumeWarning, SandboilError
+from ._hdf5 import LAYOUT, opened, refuse_foreign, said, text
 from .boundaries import COORDINATE_TOLERANCE
 from .discretise import Floats
-from .motion import Motion, ResponseSpectrum, response_spectrum
+from .motion import Kind, Motion, ResponseSpectrum, response_spectrum
 from .motion._series import STANDARD_GRAVITY, butterworth
 from .plan import described_coefficient, pore_pressure_coefficients
 from .scene import Scene
@@ -75,6 +76,9 @@ _CELL_KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 _ROWS_PER_CHUNK = 256
 # Fastest deflate level: it halves the file; higher ones cost time and gain little on noisy floats.
 _DEFLATE = 1
+
+# Longest name of what limits a time step, bytes.
+_LONGEST_LIMIT = 64
 
 # Least wall time between commits of frames, s: each waits for the disk, some hundredths of a second.
 _COMMIT_INTERVAL = 5.0
@@ -115,7 +119,7 @@ class Writer:
         self.path = path
         self._simulation = simulation
         self._disk = CommittedFile(path, exists=mark is not None)
-        self._file = h5py.File(self._disk, "w" if mark is None else "r+")
+        self._file = h5py.File(self._disk, "w" if mark is None else "r+", libver=LAYOUT)
         self._frames = 0
         self._clock = 0.0
         if mark is None:
@@ -163,33 +167,36 @@ class Writer:
         self._frames, self._clock = mark["frames"], mark["clock"]
         root = self._file
         root["VTKHDF/Steps"].attrs["NSteps"] = self._frames
-        root.attrs["status"] = "running"
-        root.attrs["message"] = ""
+        root.attrs["status"] = text("running")
+        root.attrs["message"] = text("")
         root.attrs["resumed"] = root.attrs["resumed"] + 1
 
     # What is written once
 
     def _write_head(self, accuracy: str) -> None:
         root, scene = self._file, self._simulation.scene
-        root.attrs["format"] = "sandboil results"
+        root.attrs["format"] = text("sandboil results")
         root.attrs["format_version"] = FORMAT_VERSION
-        root.attrs["sandboil_version"] = importlib.metadata.version("sandboil")
-        root.attrs["core_version"] = _core.__version__
-        root.attrs["revision"] = _core.__revision__
-        root.attrs["h5py_version"] = h5py.__version__
-        root.attrs["numpy_version"] = np.__version__
-        root.attrs["accuracy"] = accuracy
-        root.attrs["status"] = "running"
-        root.attrs["message"] = ""
+        root.attrs["sandboil_version"] = text(importlib.metadata.version("sandboil"))
+        root.attrs["core_version"] = text(_core.__version__)
+        root.attrs["revision"] = text(_core.__revision__)
+        root.attrs["h5py_version"] = text(h5py.__version__)
+        root.attrs["numpy_version"] = text(np.__version__)
+        root.attrs["accuracy"] = text(accuracy)
+        root.attrs["status"] = text("running")
+        root.attrs["message"] = text("")
         root.attrs["resumed"] = 0
         machine = root.create_group("machine")
         machine.attrs["threads"] = self._simulation.threads
-        machine.attrs["system"] = platform.platform()
-        machine.attrs["processor"] = _processor()
+        for name, value in (
+            ("system", platform.platform()),
+            ("processor", _processor()),
+            ("python_version", platform.python_version()),
+        ):
+            machine.attrs[name] = text(value)
         machine.attrs["processors"] = os.cpu_count() or 0
-        machine.attrs["python_version"] = platform.python_version()
-        root.attrs["fingerprints"] = json.dumps(self._simulation.fingerprints)
-        _text(root, "scene", [scene.to_toml(resolved=True)])
+        root.attrs["fingerprints"] = text(json.dumps(self._simulation.fingerprints))
+        _lines_of_text(root, "scene", [scene.to_toml(resolved=True)])
         for name, motion in zip(scene.stage_names, self._simulation.motions, strict=True):
             if motion is not None:
                 unit = "g" if motion.quantity == "acceleration_g" else "m/s"
@@ -197,7 +204,7 @@ class Writer:
                     root, f"motions/{name}/{motion.quantity}", getattr(motion, motion.quantity), unit
                 )
                 dataset.attrs["dt_s"] = motion.dt
-                dataset.attrs["kind"] = motion.kind
+                dataset.attrs["kind"] = text(motion.kind)
 
     def _write_nodes(self) -> None:
         particles, probes = self._simulation.particles, self._simulation.probes
@@ -213,7 +220,7 @@ class Writer:
         position = np.array([(probe.x, probe.y) for probe in probes])
         sigma_v_eff0, pore_pressure0 = particles.stress_at(position)
         group = self._file.create_group("probes")
-        _text(group, "label", [probe.label for probe in probes])
+        _lines_of_text(group, "label", [probe.label for probe in probes])
         _array(group, "position", position, "m")
         _array(group, "sigma_v_eff0", sigma_v_eff0, "kPa")
         _array(group, "pore_pressure0", pore_pressure0, "kPa")
@@ -248,7 +255,7 @@ class Writer:
         for name in written_fields(self._simulation.scene):
             shape = (nodes, 3) if name in VECTOR_FIELDS else (nodes,)
             dataset = _growing(data, name, shape, FIELDS[name].unit)
-            dataset.attrs["description"] = FIELDS[name].description
+            dataset.attrs["description"] = text(FIELDS[name].description)
             _growing(offsets, name, (_ROWS_PER_CHUNK,), "1", np.int64)
 
     def _begin_frames(self) -> None:
@@ -257,7 +264,9 @@ class Writer:
             _growing(frames, name, (_ROWS_PER_CHUNK,), unit)
         for name in ("stage", "step"):
             _growing(frames, name, (_ROWS_PER_CHUNK,), "1", np.int64)
-        _growing(frames, "time_step_limit", (_ROWS_PER_CHUNK,), "1", h5py.string_dtype())
+        _growing(
+            frames, "time_step_limit", (_ROWS_PER_CHUNK,), "1", h5py.string_dtype("utf-8", _LONGEST_LIMIT)
+        )
 
     # What grows
 
@@ -267,7 +276,7 @@ class Writer:
         stage = self._file.create_group(f"stages/{simulation.stage}")
         if simulation.stage == "gravity" and simulation.scene.seepage is not None:
             self._follow_seepage()
-        stage.attrs["flow_scheme"] = simulation.flow_scheme
+        stage.attrs["flow_scheme"] = text(simulation.flow_scheme)
         stage.attrs["duration_s"] = np.nan if simulation.duration is None else simulation.duration
         if simulation.base_impedance is not None:
             stage.attrs["base_impedance_kPa_s_per_m"] = simulation.base_impedance
@@ -387,8 +396,8 @@ class Writer:
 
     def close(self, status: Status, message: str = "") -> None:
         """Say how the run ended, commit and close the file."""
-        self._file.attrs["status"] = status
-        self._file.attrs["message"] = message
+        self._file.attrs["status"] = text(status)
+        self._file.attrs["message"] = text(message)
         self.commit()
         self.abandon()
 
@@ -432,14 +441,15 @@ def repair(path: Path) -> None:
 
 
 def _array(group: h5py.Group, name: str, values: npt.ArrayLike, unit: str) -> h5py.Dataset:
-    dataset = group.create_dataset(name, data=values)
-    dataset.attrs["units"] = unit
+    # Nothing has no sum.
+    dataset = group.create_dataset(name, data=values, fletcher32=np.size(values) > 0)
+    dataset.attrs["units"] = text(unit)
     return dataset
 
 
-def _text(group: h5py.Group, name: str, lines: list[str]) -> None:
-    dataset = group.create_dataset(name, data=lines, dtype=h5py.string_dtype())
-    dataset.attrs["units"] = "1"
+def _lines_of_text(group: h5py.Group, name: str, lines: list[str]) -> None:
+    dataset = group.create_dataset(name, data=np.stack([text(line) for line in lines]), fletcher32=True)
+    dataset.attrs["units"] = text("1")
 
 
 def _growing(
@@ -455,8 +465,9 @@ def _growing(
         shuffle=True,
         compression="gzip",
         compression_opts=_DEFLATE,
+        fletcher32=True,
     )
-    dataset.attrs["units"] = unit
+    dataset.attrs["units"] = text(unit)
     return dataset
 
 
@@ -566,24 +577,31 @@ class Run:
                 "folder", os.fspath(folder), f"must hold a {FILE_NAME}", "made by sandboil run"
             )
         with self._open() as file:
+            refuse_foreign(file, "results")
             version = file.attrs.get("format_version")
+            version = None if version is None else int(version)
             if version != FORMAT_VERSION:
                 raise InvalidInput(
                     f"{self.path}.format_version",
                     version,
                     f"must be {FORMAT_VERSION}, the layout of this version of sandboil",
+                    "read it with the sandboil that wrote it, or run the scene anew",
                 )
             self.scene = Scene.from_toml(file["scene"].asstr()[0])
-            self.status: Status = file.attrs["status"]
-            self.message: str = file.attrs["message"]
+            self.status = cast(Status, said(file.attrs["status"]))
+            self.message = said(file.attrs["message"])
             self.resumed = int(file.attrs["resumed"])
-            self.fingerprints: dict[str, str] = json.loads(file.attrs["fingerprints"])
-            self.accuracy: str = file.attrs["accuracy"]
+            self.fingerprints: dict[str, str] = json.loads(said(file.attrs["fingerprints"]))
+            self.accuracy = said(file.attrs["accuracy"])
             self.versions = {
-                name: file.attrs[f"{name}_version"] for name in ("sandboil", "core", "h5py", "numpy")
+                name: said(file.attrs[f"{name}_version"]) for name in ("sandboil", "core", "h5py", "numpy")
             }
-            self.revision: str = file.attrs.get("revision", "")
-            self.machine: dict[str, Any] = dict(file["machine"].attrs) if "machine" in file else {}
+            self.revision = said(file.attrs.get("revision", ""))
+            machine = file["machine"].attrs if "machine" in file else {}
+            self.machine: dict[str, Any] = {
+                name: int(value) if name.startswith(("threads", "processors")) else said(value)
+                for name, value in machine.items()
+            }
             labels, places = file["probes/label"].asstr()[:], file["probes/position"][:]
             self.probes = [Probe(label, *place) for label, place in zip(labels, places.tolist(), strict=True)]
             self.position: Floats = file["nodes/position"][:]
@@ -598,11 +616,7 @@ class Run:
 
     @contextmanager
     def _open(self) -> Iterator[h5py.File]:
-        try:
-            file = h5py.File(self.path, "r")
-        except OSError as error:
-            raise InvalidInput("results", str(self.path), f"cannot be read: {error}") from error
-        with file:
+        with opened(self.path, "results") as file:
             yield file
 
     def _stage(self, stage: str | None) -> str:
@@ -712,7 +726,9 @@ class Run:
                 return None
             ((quantity, samples),) = group.items()
             given: dict[str, Any] = {quantity: samples[:]}
-            return Motion(dt=float(samples.attrs["dt_s"]), kind=samples.attrs["kind"], **given)
+            return Motion(
+                dt=float(samples.attrs["dt_s"]), kind=cast(Kind, said(samples.attrs["kind"])), **given
+            )
 
     def spectrum(
         self,
@@ -901,7 +917,10 @@ class Run:
     def accounts(self, stage: str | None = None) -> dict[str, Any]:
         """Steps, wall time (s), counters and the like of a stage, as stored with it."""
         with self._open() as file:
-            return dict(file[f"stages/{self._stage(stage)}"].attrs)
+            accounts = file[f"stages/{self._stage(stage)}"].attrs
+            return {
+                name: said(value) if isinstance(value, bytes) else value for name, value in accounts.items()
+            }
 
     def time_steps(self, stage: str | None = None) -> tuple[Floats, list[str]]:
         """Time step (frames,) in s, and what limits it, in every frame of a stage."""

@@ -109,10 +109,13 @@ def run(
     if resume and start is not None:
         raise InvalidInput("start", start, "belongs to a new run", "leave out one of start and resume")
     _refuse_unusable(folder, resume)
+    checkpoint.refuse_intervals(checkpoint_seconds, checkpoint_time)
+    begun = None if start is None else _end_of(*start)
     simulation = Simulation(scene, threads, columns=columns, keep_columns=keep_columns)
     keeper = checkpoint.Keeper(folder, simulation, checkpoint_seconds, checkpoint_time)
-    if start is not None:
-        _start_from(simulation, *start)
+    if begun is not None:
+        checkpoint.refuse_other_start(begun, simulation.fingerprints)
+        simulation.restore(begun.path, begun.note.stage)
     with _only_user(folder):
         entry = None
         if resume:
@@ -154,7 +157,12 @@ def _refuse_unusable(folder: Path, resume: bool) -> None:
             "choose another, remove it, or resume that run",
         )
     if resume and FILE_NAME not in found and twin_of(path).name not in found:
-        raise InvalidInput("out", str(folder), f"must hold a run to resume, but has no {FILE_NAME}")
+        raise InvalidInput(
+            "out",
+            str(folder),
+            f"must hold a run to resume, but has no {FILE_NAME}",
+            "leave resume out to begin one",
+        )
     existing = next(place for place in [folder, *folder.absolute().parents] if place.exists())
     if not existing.is_dir():
         raise InvalidInput(
@@ -226,12 +234,9 @@ def _earlier(folder: Path, simulation: Simulation) -> tuple[Run, checkpoint.Note
     return earlier, None
 
 
-def _start_from(simulation: Simulation, run: Run | str | os.PathLike[str], stage: str) -> None:
-    """Let a simulation begin with the end of a stage of another run."""
-    folder = run.path.parent if isinstance(run, Run) else Path(run)
-    state = checkpoint.at_end_of(folder, stage)
-    checkpoint.refuse_other_start(state, simulation.fingerprints)
-    simulation.restore(state.path, stage)
+def _end_of(run: Run | str | os.PathLike[str], stage: str) -> checkpoint.Stored:
+    """The state at the end of a stage of another run."""
+    return checkpoint.at_end_of(run.path.parent if isinstance(run, Run) else Path(run), stage)
 
 
 def _run_stages(

@@ -16,11 +16,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from pydantic import Field, StrictBool, model_validator
+from pydantic.config import JsonDict
 from shapely.geometry.base import BaseGeometry
 
 from . import _core, _toml
 from ._errors import InvalidInput
-from ._model import Many, Model, Number
+from ._model import MAX_PARTS, MAX_POINTS, Many, Model, Number, field_remedy
 from ._motion_spec import GivenMotion, MotionSpec
 from .boundaries import (
     COORDINATE_TOLERANCE,
@@ -80,6 +81,12 @@ DEFAULT_LAYER = 1.0
 # Relative mismatch up to which densities given twice are the same: they come with three to four digits.
 DENSITY_TOLERANCE = 1.0e-3
 
+_POROSITY: JsonDict = {"remedy": "sand has a porosity of 0.35 to 0.5, a void ratio of 0.5 to 1"}
+_UNIT_WEIGHT: JsonDict = {"remedy": "soil weighs 14 to 22 kN/m3; 1800 kg/m3 are 17.7"}
+_REGIONS: JsonDict = {"remedy": "regions of one soil can be one polygon"}
+_STAGES: JsonDict = {"remedy": "for example Gravity() and Shaking(motion)"}
+_LEAVE: JsonDict = {"remedy": "leave it out for the default, which suits most scenes"}
+
 Count = Annotated[int, Field(strict=True, ge=1)]
 Poisson = Annotated[Number, Field(ge=0.0, lt=0.5)]
 # Hz, far beyond earthquakes and sites on both sides; outside, damping would make time steps of nothing.
@@ -119,7 +126,7 @@ class Polygon(Model):
     _label: ClassVar[str] = "shape"
 
     kind: Literal["polygon"] = "polygon"
-    points: Many[Point] = Field(min_length=3, description="corners (x, y) in order, m")
+    points: Many[Point] = Field(min_length=3, max_length=MAX_POINTS, description="corners (x, y) in order, m")
 
     @model_validator(mode="after")
     def _simple(self) -> Polygon:
@@ -132,7 +139,12 @@ class Polygon(Model):
                 "give the corners in order around the region",
             )
         if geometry.area <= COORDINATE_TOLERANCE * geometry.length:
-            raise InvalidInput("shape.points", self.points, "must enclose an area, the region is empty")
+            raise InvalidInput(
+                "shape.points",
+                self.points,
+                "must enclose an area, the region is empty",
+                "give the corners in order around the region",
+            )
         return self
 
     @property
@@ -180,25 +192,37 @@ class Region(Model):
     _label: ClassVar[str] = "region"
     _positional: ClassVar[tuple[str, ...]] = ("name", "shape", "material")
 
-    name: str = Field(min_length=1)
+    name: str = Field(min_length=1, json_schema_extra={"remedy": "name what it is: 'loose sand'"})
     shape: Shape
     material: Material
     hydraulic_conductivity: AnyConductivity | None = Field(
-        default=None, description="m/s, the same in all directions or a Conductivity; none: undrained"
+        default=None,
+        description="m/s, the same in all directions or a Conductivity; none: undrained",
+        json_schema_extra={"remedy": "1e-3 is a coarse sand, 1e-5 a fine one, 1e-8 a silty clay"},
     )
     retention: VanGenuchten | None = Field(
         default=None, description="what it holds above the water table; none: all pores stay full"
     )
     Gs: Annotated[Number, Field(gt=1.0)] | None = Field(
-        default=None, description="specific gravity of the solids"
+        default=None,
+        description="specific gravity of the solids",
+        json_schema_extra={"remedy": "2.65 for quartz, 2.7 for most soils"},
     )
     porosity: Annotated[Number, Field(gt=0.0, lt=1.0)] | None = Field(
-        default=None, description="pores per volume of soil"
+        default=None, description="pores per volume of soil", json_schema_extra=_POROSITY
     )
-    void_ratio: Positive | None = Field(default=None, description="pores per volume of solids")
-    dry_unit_weight: Positive | None = Field(default=None, description="kN/m3")
-    bulk_unit_weight: Positive | None = Field(default=None, description="kN/m3")
-    saturated_unit_weight: Positive | None = Field(default=None, description="kN/m3")
+    void_ratio: Positive | None = Field(
+        default=None, description="pores per volume of solids", json_schema_extra=_POROSITY
+    )
+    dry_unit_weight: Positive | None = Field(
+        default=None, description="kN/m3", json_schema_extra=_UNIT_WEIGHT
+    )
+    bulk_unit_weight: Positive | None = Field(
+        default=None, description="kN/m3", json_schema_extra=_UNIT_WEIGHT
+    )
+    saturated_unit_weight: Positive | None = Field(
+        default=None, description="kN/m3", json_schema_extra=_UNIT_WEIGHT
+    )
     K0: Number = Field(
         default=0.5,
         gt=0.0,
@@ -358,8 +382,15 @@ class Water(Model):
 
     _label: ClassVar[str] = "water"
 
-    unit_weight: Number = Field(default=10.0, gt=0.0, description="kN/m3")
-    bulk_modulus: Number = Field(default=1.0e6, gt=0.0, description="kPa")
+    unit_weight: Number = Field(
+        default=10.0, gt=0.0, description="kN/m3", json_schema_extra={"remedy": "9.81 to 10 for water"}
+    )
+    bulk_modulus: Number = Field(
+        default=1.0e6,
+        gt=0.0,
+        description="kPa",
+        json_schema_extra={"remedy": "2.2e6 for water without air, less with bubbles in it"},
+    )
 
 
 class WaterTable(Model):
@@ -373,7 +404,7 @@ class WaterTable(Model):
 
     elevation: Number | None = Field(default=None, description="m")
     depth: Number | None = Field(default=None, description="below the highest ground, m")
-    points: Annotated[Many[Point], Field(min_length=2)] | None = Field(
+    points: Annotated[Many[Point], Field(min_length=2, max_length=MAX_PARTS)] | None = Field(
         default=None, description="(x, y) from left to right, m; level beyond its ends"
     )
     above: Literal["dry", "retention"] | None = None
@@ -386,12 +417,16 @@ class WaterTable(Model):
                 "water_table",
                 said,
                 "must be given by exactly one of elevation, depth and points",
+                "depth = 0 is at the highest ground",
             )
         if self.points is not None:
             for i, (before, after) in enumerate(itertools.pairwise(self.points)):
                 if not after[0] > before[0]:
                     raise InvalidInput(
-                        f"water_table.points[{i + 1}]", after, "must lie to the right of the point before it"
+                        f"water_table.points[{i + 1}]",
+                        after,
+                        "must lie to the right of the point before it",
+                        "order the points from left to right",
                     )
         return self
 
@@ -406,9 +441,23 @@ class Gravity(Model):
     _label: ClassVar[str] = "stage"
 
     kind: Literal["gravity"] = "gravity"
-    tolerance: Number = Field(default=1.0e-4, gt=0.0, lt=1.0, description="largest acceleration over gravity")
-    max_steps: Count = 200_000
-    initial_poisson_ratio: Poisson | None = None
+    tolerance: Number = Field(
+        default=1.0e-4,
+        gt=0.0,
+        lt=1.0,
+        description="largest acceleration over gravity",
+        json_schema_extra={"remedy": "leave it out for 1e-4"},
+    )
+    max_steps: Count = Field(
+        default=200_000,
+        description="after which it gives up",
+        json_schema_extra={"remedy": "leave it out for 200000"},
+    )
+    initial_poisson_ratio: Poisson | None = Field(
+        default=None,
+        description="nu of the ground at rest",
+        json_schema_extra={"remedy": "leave it out for K0/(1 + K0) of each region"},
+    )
     base: Literal["no-slip", "free-slip"] = "no-slip"
 
 
@@ -428,7 +477,10 @@ class Rayleigh(Model):
         description="damping ratio, 1",
         json_schema_extra={"remedy": "a fraction: 0.005 is half a per cent"},
     )
-    frequencies: tuple[Frequency, Frequency] = Field(description="low and high, Hz")
+    frequencies: tuple[Frequency, Frequency] = Field(
+        description="low and high, Hz",
+        json_schema_extra={"remedy": "the site's own frequency, and about five times that"},
+    )
 
     @model_validator(mode="after")
     def _ascending(self) -> Rayleigh:
@@ -469,7 +521,9 @@ class Shaking(Model):
     motion: GivenMotion = None
     vertical: GivenMotion = None
     base: CompliantBase = CompliantBase()
-    duration: Positive | None = Field(default=None, description="s")
+    duration: Positive | None = Field(
+        default=None, description="s", json_schema_extra={"remedy": "leave it out for that of the motion"}
+    )
     rayleigh: Rayleigh | None = None
     conditions: Many[Condition] | None = Field(default=None, description="left out: as before")
 
@@ -569,10 +623,20 @@ class Output(Model):
 
     _label: ClassVar[str] = "output"
 
-    depths: Many[Number] = Field(default=(), description="m below the ground surface")
-    points: Many[Point] = Field(default=(), description="(x, y), m")
-    history_dt: Number = Field(default=0.005, gt=0.0, description="s")
-    field_dt: Number = Field(default=0.25, gt=0.0, description="s")
+    depths: Many[Number] = Field(default=(), max_length=MAX_PARTS, description="m below the ground surface")
+    points: Many[Point] = Field(default=(), max_length=MAX_PARTS, description="(x, y), m")
+    history_dt: Number = Field(
+        default=0.005,
+        gt=0.0,
+        description="s",
+        json_schema_extra={"remedy": "0.005 shows all below 100 Hz"},
+    )
+    field_dt: Number = Field(
+        default=0.25,
+        gt=0.0,
+        description="s",
+        json_schema_extra={"remedy": "0.25 makes four pictures a second"},
+    )
     envelopes: Many[Literal["r_u", "gamma_max"]] = ("r_u", "gamma_max")
     stress_paths: StrictBool = Field(
         default=True, description="shear stress, vertical stress and strain at the depths"
@@ -593,16 +657,28 @@ class Numerics(Model):
     _label: ClassVar[str] = "numerics"
 
     operators: Literal["conservative", "printed"] = "conservative"
-    smoothing_ratio: Number = Field(default=1.4, ge=1.0, le=3.0, description="h/spacing")
-    velocity_filter: Annotated[Number, Field(ge=0.0, le=1.0)] | None = None
-    local_damping: Number = Field(default=0.0, ge=0.0, lt=1.0)
-    time_step_factor: Annotated[Number, Field(gt=0.0, le=2.0)] | None = None
+    smoothing_ratio: Number = Field(
+        default=1.4, ge=1.0, le=3.0, description="h/spacing", json_schema_extra=_LEAVE
+    )
+    velocity_filter: Annotated[Number, Field(ge=0.0, le=1.0)] | None = Field(
+        default=None, description="fraction per step", json_schema_extra=_LEAVE
+    )
+    local_damping: Number = Field(
+        default=0.0, ge=0.0, lt=1.0, description="fraction of the force", json_schema_extra=_LEAVE
+    )
+    time_step_factor: Annotated[Number, Field(gt=0.0, le=2.0)] | None = Field(
+        default=None, description="of the stability limit", json_schema_extra=_LEAVE
+    )
     integrator: Literal["default", "rk4", "reference"] = "default"
-    integrator_tolerance: Annotated[Number, Field(gt=0.0, le=1.0e-4)] | None = None
+    integrator_tolerance: Annotated[Number, Field(gt=0.0, le=1.0e-4)] | None = Field(
+        default=None, description="relative error of a sub-step", json_schema_extra=_LEAVE
+    )
     diffusion: Literal["auto", "implicit", "explicit"] = "auto"
     acceleration_term: Literal["auto", "on", "off"] = "auto"
     dispersion_correction: StrictBool = False
-    geometry_strain_limit: Positive | None = None
+    geometry_strain_limit: Positive | None = Field(
+        default=None, description="strain", json_schema_extra=_LEAVE
+    )
     gap_memory: StrictBool = False
 
     @property
@@ -652,13 +728,22 @@ class Scene(Model):
 
     _label: ClassVar[str] = "scene"
 
-    spacing: Number = Field(gt=0.0, description="particle spacing, m")
-    gravity: Number = Field(default=9.81, gt=0.0, description="m/s2")
+    spacing: Number = Field(
+        gt=0.0,
+        description="particle spacing, m",
+        json_schema_extra={"remedy": "a fifth of the thinnest layer: 0.2 to 1 m in most sections"},
+    )
+    gravity: Number = Field(
+        default=9.81,
+        gt=0.0,
+        description="m/s2",
+        json_schema_extra={"remedy": "9.81: downwards without a sign"},
+    )
     water: Water | None = None
     water_table: WaterTable | None = None
-    regions: Many[Region] = Field(min_length=1)
+    regions: Many[Region] = Field(min_length=1, max_length=MAX_PARTS, json_schema_extra=_REGIONS)
     sides: AnySides = Periodic()
-    stages: Many[Stage] = Field(min_length=1)
+    stages: Many[Stage] = Field(min_length=1, max_length=MAX_PARTS, json_schema_extra=_STAGES)
     output: Output = Output()
     numerics: Numerics = Numerics()
 
@@ -689,7 +774,10 @@ class Scene(Model):
         for i, name in enumerate(names):
             if name in names[:i]:
                 raise InvalidInput(
-                    f"scene.regions[{i}].name", name, f"is already the name of regions[{names.index(name)}]"
+                    f"scene.regions[{i}].name",
+                    name,
+                    f"is already the name of regions[{names.index(name)}]",
+                    "give each its own",
                 )
 
     def _check_overlaps(self) -> None:
@@ -817,6 +905,7 @@ class Scene(Model):
                     "scene.spacing",
                     self.spacing,
                     f"must not exceed the least extent of any region, {thickness:g} m ({region.name})",
+                    "a fifth of the thinnest layer, or join layers that are thinner",
                 )
 
     def _check_water(self) -> None:
@@ -1095,9 +1184,24 @@ class Scene(Model):
             return bottom + min(value for _, value in condition.pressure) / self.water.unit_weight
         return bottom if isinstance(condition, SeepageFace | Drain) else float("inf")
 
+    def _is_drowned(self, stage: Seepage) -> bool:
+        """Whether open water stands on all of the ground: a drain then draws through what stays full."""
+        dry = shapely.LineString(self.outline.surface)
+        for condition in stage.conditions:
+            if (told := heads_of(condition)) is not None:
+                line = self.condition_line(condition)
+                if min(value for _, value in told[1]) >= line.bounds[3] - COORDINATE_TOLERANCE:
+                    dry = dry.difference(shapely.buffer(line, COORDINATE_TOLERANCE))
+        return bool(dry.length <= COORDINATE_TOLERANCE)
+
     def _check_desaturation(self, stage: Seepage, path: str) -> None:
         """Soil that heads leave above them must say what it holds."""
-        levels = [self._lowest_head(condition) for condition in stage.conditions]
+        drowned = self._is_drowned(stage)
+        levels = [
+            self._lowest_head(condition)
+            for condition in stage.conditions
+            if not (drowned and isinstance(condition, Drain))
+        ]
         level = min([*levels, float(self.water_level_at(np.array(self.bounds[0::2])).min())])
         for i, region in enumerate(self.regions):
             if region.retention is None and region.geometry.bounds[3] > level + self.spacing:
@@ -1136,7 +1240,8 @@ class Scene(Model):
                 _core.small_strain_moduli(region.material.core(), (-100.0, -100.0, 0.0, -100.0))
             except InvalidInput as error:
                 path = f"scene.regions[{i}].material.{error.path}"
-                raise InvalidInput(path, error.value, error.allowed, error.hint) from None
+                remedy = field_remedy(type(region.material).model_fields[error.path])
+                raise InvalidInput(path, error.value, error.allowed, remedy) from None
 
     def _check_densities(self) -> None:
         for i, region in enumerate(self.regions):
@@ -1153,11 +1258,15 @@ class Scene(Model):
                 f"scene.stages[{first}].kind",
                 self.stages[first].kind,
                 "must be 'gravity': shaking needs the stresses at rest",
+                "put Gravity() before it",
             )
         for i, stage in enumerate(self.stages[first + 1 :], start=first + 1):
             if isinstance(stage, Gravity):
                 raise InvalidInput(
-                    f"scene.stages[{i}].kind", "gravity", "must come before all shaking, and only once"
+                    f"scene.stages[{i}].kind",
+                    "gravity",
+                    "must come before all shaking, and only once",
+                    "leave it out",
                 )
 
     def _check_bases(self) -> None:
@@ -1208,6 +1317,7 @@ class Scene(Model):
                         [arrival.x for arrival in arrivals],
                         f"must cover the base, x {x0:g} to {x1:g} m, side by side, but they {told} from "
                         f"{low:g} to {high:g}",
+                        "let each begin where the one before ends",
                     )
         duration = stage.duration
         for arrival in arrivals:
@@ -1269,7 +1379,7 @@ class Scene(Model):
                 )
         for i, depth in enumerate(self.output.depths):
             if depth in self.output.depths[:i]:
-                raise InvalidInput(f"scene.output.depths[{i}]", depth, "is named twice")
+                raise InvalidInput(f"scene.output.depths[{i}]", depth, "is named twice", "leave it out")
         x = 0.5 * (left + right)
         ends = shapely.LineString([(x, bottom), (x, top)]).intersection(self.section).bounds
         thickness = ends[3] - self.outline.base_elevation(x)
@@ -1285,7 +1395,10 @@ class Scene(Model):
         for i, point in enumerate(self.output.points):
             if not section.covers(shapely.Point(point)):
                 raise InvalidInput(
-                    f"scene.output.points[{i}]", point, f"must lie in the section, bounds {self.bounds}"
+                    f"scene.output.points[{i}]",
+                    point,
+                    f"must lie in the section, x {left:g} to {right:g}, y {bottom:g} to {top:g} m",
+                    "points are (x, y) in the section's own coordinates",
                 )
 
     # What follows from the scene.
@@ -1516,6 +1629,7 @@ class Scene(Model):
                 "scene.stages",
                 self.stage_names,
                 "must hold a shaking stage with a motion for another to replace it",
+                "give the stage a motion in the scene",
             )
         for i, stage in enumerate(self.stages):
             if isinstance(stage, Shaking) and stage.motion is not None and stage.vertical is not None:
@@ -1575,7 +1689,9 @@ class Scene(Model):
             try:
                 Path(path).write_text(text, encoding="utf-8")
             except OSError as error:
-                raise InvalidInput("path", str(path), f"must be writable: {error.strerror}") from error
+                raise InvalidInput(
+                    "path", str(path), f"must be writable: {error.strerror}", "check folder and rights"
+                ) from error
         return text
 
     @classmethod

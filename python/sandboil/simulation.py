@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._errors import InvalidInput, SandboilError, SandboilWarning, nearest_name
+from ._errors import InvalidInput, SandboilError, SandboilWarning, SuctionWarning, nearest_name
 from ._fingerprint import fingerprint
 from .boundaries import Periodic
 from .columns import HANDS, ColumnRecord
@@ -139,7 +139,10 @@ def unknown_name(path: str, name: str, known: list[str]) -> InvalidInput:
     """The refusal of a name that is none of `known`, with the nearest right one."""
     meant = nearest_name(name, known)
     return InvalidInput(
-        path, name, f"must be one of {', '.join(known)}", f"did you mean {meant!r}?" if meant else None
+        path,
+        name,
+        f"must be one of {', '.join(known)}",
+        f"did you mean {meant!r}?" if meant else "take one of these",
     )
 
 
@@ -199,7 +202,12 @@ class Simulation:
         keep_columns: bool = False,
     ) -> None:
         if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= MAX_THREADS:
-            raise InvalidInput("threads", threads, f"must be a whole number from 1 to {MAX_THREADS}")
+            raise InvalidInput(
+                "threads",
+                threads,
+                f"must be a whole number from 1 to {MAX_THREADS}",
+                "as many as the machine has cores",
+            )
         self.scene = scene
         self.particles = discretise(scene)
         self.probes = probes_of(scene, self.particles)
@@ -213,7 +221,9 @@ class Simulation:
         self._section = _description(scene, self.particles)
         if scene.seepage is not None and (columns is not None or keep_columns):
             name, value = ("columns", columns) if columns is not None else ("keep_columns", keep_columns)
-            raise InvalidInput(name, value, "does not go with a seepage stage: columns follow from its water")
+            raise InvalidInput(
+                name, value, "does not go with a seepage stage: columns follow from its water", "leave it out"
+            )
         self.threads = threads
         self._stages = [
             _shaking_description(scene, stage, duration, waves, self.probes)
@@ -291,7 +301,7 @@ class Simulation:
         made = 0
         while made < count and self._under_way():
             before = self._present.step
-            self._present.advance(steps=count - made, until=math.inf, seconds=LOOK_INTERVAL)
+            self._advance(count - made, math.inf, LOOK_INTERVAL)
             made += self._present.step - before
         return made
 
@@ -307,8 +317,32 @@ class Simulation:
         Returns whether `until` or the end of the stage is reached, to half a time step: the time step is
         never changed to meet it.
         """
-        done = self._present.advance(steps=_NO_LIMIT, until=until, seconds=seconds)
+        done = self._advance(_NO_LIMIT, until, seconds)
         return done or self._present.time + 0.5 * self.dt >= until
+
+    def _advance(self, steps: int, until: float, seconds: float) -> bool:
+        """Let the core go on with the present stage; returns whether that is over."""
+        done = self._present.advance(steps=steps, until=until, seconds=seconds)
+        if done and isinstance(self._present, _core.Seepage):
+            self._tell_suction(self._present.pore_pressure())
+        return done
+
+    def _tell_suction(self, pressure: Floats) -> None:
+        """Warn of a suction, of more than a spacing's height, in soil without a retention curve."""
+        scene = self.scene
+        assert scene.water is not None
+        is_full = np.array([region.retention is None for region in scene.regions])[self.particles.region]
+        lowest = int(np.argmin(np.where(is_full, pressure, np.inf)))
+        if not is_full[lowest] or pressure[lowest] >= -scene.spacing * scene.water.unit_weight:
+            return
+        x, y = self.particles.position[lowest]
+        told = (
+            f"scene.stages[0] leaves a suction of {-pressure[lowest]:.3g} kPa at ({x:g}, {y:g}) m in region "
+            f"{scene.regions[self.particles.region[lowest]].name!r}, which was computed as full: give "
+            "it a retention curve, or draw less water out"
+        )
+        self.doubts.append(told)
+        warnings.warn(told, SuctionWarning, stacklevel=4)
 
     def store(self, path: str | os.PathLike[str], note: bytes = b"") -> None:
         """Write all that the simulation is to a file, to go on from by :meth:`restore`, with a note.
@@ -413,7 +447,9 @@ class Simulation:
         ]
         if not sides:
             name, value = ("columns", str(read)) if read is not None else ("keep_columns", keep)
-            raise InvalidInput(name, value, "goes with free-field sides, of which the scene has none")
+            raise InvalidInput(
+                name, value, "goes with free-field sides, of which the scene has none", "leave it out"
+            )
         stages = dict(zip(self.scene.stage_names, self._stages, strict=True))
         keys = [
             (name, hand, column_key(section, stage, hand, _gravity(self.scene).tolerance))

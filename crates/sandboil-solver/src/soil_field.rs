@@ -101,25 +101,11 @@ struct Outcome {
 
 /// The soil models of a stage.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
-#[serde(from = "StoredSoilField")]
 pub struct SoilField {
     groups: Vec<Group>,
-    /// Of the chunks of the longest group, in a step.
+    /// Of the chunks of a group, in a step; as many as the longest had so far.
     #[serde(skip)]
     outcomes: Vec<Outcome>,
-}
-
-/// What of a [`SoilField`] is stored.
-#[derive(serde::Deserialize)]
-struct StoredSoilField {
-    groups: Vec<Group>,
-}
-
-impl From<StoredSoilField> for SoilField {
-    fn from(StoredSoilField { groups }: StoredSoilField) -> Self {
-        let longest = groups.iter().map(|group| group.rows.len()).max().unwrap_or(0);
-        Self { groups, outcomes: vec![Outcome::default(); chunks(longest)] }
-    }
 }
 
 /// The velocity field of a step, and what the force loop wants of it.
@@ -287,7 +273,7 @@ impl SoilField {
             .into_iter()
             .map(|(region, rows)| Ok(Group { region, law: law(region, rows.clone())?, rows }))
             .collect::<Result<_, SolverError>>()?;
-        Ok(StoredSoilField { groups }.into())
+        Ok(Self { groups, outcomes: Vec::new() })
     }
 
     /// Moves every stress node through one step: strain from the velocity field, stress from the soil model,
@@ -308,6 +294,9 @@ impl SoilField {
         for group in &mut self.groups {
             let first_row = group.rows.start;
             let used = chunks(group.rows.len());
+            if self.outcomes.len() < used {
+                self.outcomes.resize(used, Outcome::default());
+            }
             let outcomes = &mut self.outcomes[..used];
             let a = &mut points[group.rows.clone()];
             let b = &mut shares[group.rows.clone()];

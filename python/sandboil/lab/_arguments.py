@@ -27,11 +27,11 @@ def _finite(value: object, dimensions: int, shape: str) -> Floats:
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ValueError(f"must be numbers in {shape}") from None
+        raise ValueError(f"must be numbers in {shape}; write them without quotes") from None
     if array.ndim != dimensions or array.size == 0:
-        raise ValueError(f"must have {shape}, not {array.shape}")
+        raise ValueError(f"must have {shape}, not {array.shape}; reshape or transpose it")
     if not np.isfinite(array).all():
-        raise ValueError("must be finite throughout")
+        raise ValueError("must be finite throughout; find out where the others come from")
     return array
 
 
@@ -42,23 +42,23 @@ def _as_integer(value: object) -> int:
             raise TypeError
         return operator.index(cast(Any, value))
     except TypeError:
-        raise ValueError("must be a whole number") from None
+        raise ValueError("must be a whole number; write it without a point") from None
 
 
-def _as_series(value: object) -> Floats:
+def as_series(value: object) -> Floats:
     return _finite(value, 1, "shape (n,), n at least 1")
 
 
 def _as_path(value: object) -> Floats:
     array = _finite(value, 2, "shape (n, 3), n at least 1")
     if array.shape[1] != 3:
-        raise ValueError(f"must have shape (n, 3), not {array.shape}")
+        raise ValueError(f"must have shape (n, 3), not {array.shape}; a row is xx, yy, xy")
     return array
 
 
 def _within(array: Floats, limit: float, remedy: str) -> Floats:
     if np.abs(array).max() > limit:
-        raise ValueError(f"must lie within {limit:g}: {remedy}")
+        raise ValueError(f"must lie within {limit:g}; {remedy}")
     return array
 
 
@@ -71,22 +71,27 @@ def _as_stress_path(value: object) -> Floats:
 
 
 def _as_amplitudes(value: object) -> Floats:
-    strains = _as_series(value)
+    strains = as_series(value)
     if not ((strains > 0.0) & (strains <= _STRAIN_MAX)).all():
-        raise ValueError(f"must lie in (0, {_STRAIN_MAX:g}]: strains are fractions, 1 % is written 0.01")
+        raise ValueError(f"must lie in (0, {_STRAIN_MAX:g}]; strains are fractions, 1 % is written 0.01")
     return strains
 
 
 def _as_tested(value: object) -> ShearTest:
     if not isinstance(value, ShearTest) or value.specimen is None:
-        raise ValueError("must be a test of sb.lab.cyclic_dss or sb.lab.monotonic_dss, with its specimen")
+        raise ValueError(
+            "must be a test of sb.lab.cyclic_dss or sb.lab.monotonic_dss, with its specimen; "
+            "hand over what they give"
+        )
     return value
 
 
 def _as_stress(value: object) -> Floats:
     array = _finite(value, 1, "3 or 4 components xx, yy, xy and zz")
     if len(array) not in (3, 4):
-        raise ValueError(f"must have 3 or 4 components xx, yy, xy and zz, not {len(array)}")
+        raise ValueError(
+            f"must have 3 or 4 components xx, yy, xy and zz, not {len(array)}; tension is positive"
+        )
     return _within(array, _specimen.SIGMA_MAX, "stresses are in kPa")
 
 
@@ -97,11 +102,17 @@ Pressure = Annotated[
         gt=0.0,
         le=_specimen.SIGMA_MAX,
         description="vertical effective stress, kPa, compression positive",
+        json_schema_extra={"remedy": "100 is about one atmosphere, 5 to 10 m of soil under water"},
     ),
 ]
 EarthPressure = Annotated[
     Number,
-    Field(gt=0.0, le=_specimen.K0_MAX, description="horizontal over vertical effective stress"),
+    Field(
+        gt=0.0,
+        le=_specimen.K0_MAX,
+        description="horizontal over vertical effective stress",
+        json_schema_extra={"remedy": "0.4 to 1 in most ground"},
+    ),
 ]
 Ratio = Annotated[Number, Field(gt=0.0, description="cyclic shear stress over sigma_v0")]
 Bias = Annotated[Number, Field(description="static shear stress over sigma_v0")]
@@ -122,7 +133,7 @@ Tolerance = (
     Annotated[Number, Field(gt=0.0, le=_TOLERANCE_MAX, description="of the default integrator, relative")]
     | None
 )
-Series = Annotated[ArrayLike, PlainValidator(_as_series)]
+Series = Annotated[ArrayLike, PlainValidator(as_series)]
 StrainPath = Annotated[ArrayLike, PlainValidator(_as_strain_path)]
 StressPath = Annotated[ArrayLike, PlainValidator(_as_stress_path)]
 Amplitudes = Annotated[ArrayLike, PlainValidator(_as_amplitudes)]

@@ -109,7 +109,7 @@ def calibration(Dr: float, G0: float, crr: float, **options: Any) -> Calibration
             "is what the calibration finds"
             if name == "hpo"
             else f"unknown key, known are {', '.join(known)}",
-            None if name == "hpo" or nearest is None else f"did you mean {nearest!r}?",
+            "leave it out" if name == "hpo" or nearest is None else f"did you mean {nearest!r}?",
         )
     secondary = {name: value for name, value in options.items() if name not in _OPTIONS}
     options = {name: value for name, value in options.items() if name in _OPTIONS}

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from numpy.typing import ArrayLike
+from pydantic import Field, PlainValidator
 
 from .._errors import InvalidInput
 from .._model import Number
@@ -25,10 +26,12 @@ from ._arguments import (
     Series,
     Soil,
     VoidRatio,
+    as_series,
     checked,
 )
 from ._results import Table
-from ._shear import cyclic_dss
+from ._shear import check_reach, cyclic_dss
+from ._specimen import consolidated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,6 +61,14 @@ _CURVE_CYCLES = 500
 _CYCLES_MAX = 1e4
 
 
+def _as_ratios(value: object) -> Floats:
+    ratios = as_series(value)
+    if not (ratios > 0.0).all():
+        raise ValueError("must be greater than 0 throughout; ratios to sigma_v0, for example [0.1, 0.2]")
+    return ratios
+
+
+Ratios = Annotated[ArrayLike, PlainValidator(_as_ratios)]
 Cycles = Annotated[Number, Field(gt=0.5, le=_CYCLES_MAX, description="uniform cycles")]
 PressureRatio = Annotated[Number, Field(gt=0.0, le=1.0, description="excess pore pressure ratio, 1")]
 
@@ -72,6 +83,12 @@ class Conditions:
     void_ratio: float | None = None
     integrator: str = "default"
 
+    def check(self, where: str, soil: Soil, csr: Floats | None = None) -> None:
+        """Refuse, before any test, conditions and stress ratios that a specimen cannot bear."""
+        specimen = consolidated(where, soil, **self.arguments(), tolerance=None)
+        if csr is not None:
+            check_reach(f"{where}.csr", soil, specimen, self.static_shear_ratio + csr, drained=False)
+
     def arguments(self) -> dict[str, Any]:
         """As keyword arguments."""
         return dict(vars(self))
@@ -82,7 +99,9 @@ def criterion_of(gamma_sa: float | None, gamma_da: float | None, r_u: float | No
     given = {"gamma_sa": gamma_sa, "gamma_da": gamma_da, "r_u": r_u}
     named = {name: value for name, value in given.items() if value is not None}
     if len(named) > 1:
-        raise InvalidInput("lab.criterion", named, "must be one of gamma_sa, gamma_da and r_u")
+        raise InvalidInput(
+            "lab.criterion", named, "must be one of gamma_sa, gamma_da and r_u", "leave out all but one"
+        )
     return named or {"gamma_sa": 0.03}
 
 
@@ -222,7 +241,7 @@ class ResistanceCurve(Table):
 @checked
 def crr_curve(
     soil: Soil,
-    csr: Series | None = None,
+    csr: Ratios | None = None,
     *,
     max_cycles: Count = _CURVE_CYCLES,
     sigma_v0: Pressure = correlations.P_ATM,
@@ -244,10 +263,12 @@ def crr_curve(
                 "lab.crr_curve.csr",
                 None,
                 "must be given: this sand has no resistance in 15 cycles to start from",
+                "for example [0.1, 0.2, 0.3]",
             )
         ratios = middle * np.asarray(_CURVE_FRACTIONS)
     else:
         ratios = np.asarray(csr, dtype=np.float64)
+        conditions.check("lab.crr_curve", soil, ratios)
     cycles: dict[str, list[float]] = {name: [] for name in CRITERIA}
     for ratio in ratios:
         test = cyclic_dss(
@@ -299,6 +320,8 @@ def k_sigma(
     stresses = np.asarray(sigma_v0, dtype=np.float64)
     blows = correlations.spt_from_relative_density(soil.Dr)
     published = np.asarray([correlations.k_sigma(float(s), N160cs=blows) for s in stresses])
+    for stress in stresses:
+        Conditions(float(stress), K0, integrator=integrator).check("lab.k_sigma", soil)
     reference = crr(soil, cycles=cycles, gamma_sa=gamma_sa, K0=K0, integrator=integrator)
     found = np.asarray(
         [
@@ -333,6 +356,8 @@ def k_alpha(
     published = np.asarray(
         [correlations.k_alpha(float(a), Dr=soil.Dr, sigma_v0=sigma_v0, K0=K0) for a in ratios]
     )
+    for ratio in ratios:
+        Conditions(sigma_v0, K0, float(ratio), integrator=integrator).check("lab.k_alpha", soil)
     reference = crr(soil, cycles=cycles, gamma_sa=gamma_sa, sigma_v0=sigma_v0, K0=K0, integrator=integrator)
     found = np.asarray(
         [

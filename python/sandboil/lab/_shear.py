@@ -81,7 +81,9 @@ def cyclic_dss(
     asked = {"csr": csr, "reversals": reversals, "gamma_reversals": gamma_reversals}
     given = [name for name, value in asked.items() if value is not None]
     if len(given) != 1:
-        raise InvalidInput(where, given, f"must be given exactly one of {', '.join(asked)}")
+        raise InvalidInput(
+            where, given, f"must be given exactly one of {', '.join(asked)}", "csr = 0.15 is a uniform test"
+        )
     specimen = consolidated(
         where,
         soil,
@@ -230,6 +232,7 @@ def check_reach(path: str, soil: Soil, specimen: _core.Specimen, turning: Floats
             path,
             float(beyond[0]),
             f"must turn within {most:.3f} of sigma_v0: this sand's {strength} allows no more",
+            "a ratio to sigma_v0 is meant, not a stress in kPa",
         )
 
 

@@ -80,7 +80,7 @@ def as_soil(value: object) -> object:
     ours = ", ".join(f"sb.{kind.__name__}" for kind in _OURS)
     raise ValueError(
         f"must be a material ({ours}) or an object with the methods initialise, update, stress and moduli "
-        "(sb.lab.SoilModel)"
+        "(sb.lab.SoilModel); make one by its parameters"
     )
 
 
@@ -110,7 +110,10 @@ def consolidated(
         if not carried(sigma_v0, 1.0, 0.0):
             least = _edge(lambda value: carried(value, 1.0, 0.0), SIGMA_MAX, sigma_v0)
             raise InvalidInput(
-                f"{where}.sigma_v0", sigma_v0, f"must be at least {least:.4g} kPa for this soil to carry it"
+                f"{where}.sigma_v0",
+                sigma_v0,
+                f"must be at least {least:.4g} kPa for this soil to carry it",
+                "stresses are in kPa: 0.1 MPa is written 100",
             )
         if not carried(sigma_v0, K0, 0.0):
             least, most = (
@@ -120,6 +123,7 @@ def consolidated(
                 f"{where}.K0",
                 K0,
                 f"must lie in [{least:.3f}, {most:.3f}]: beyond it this soil fails before the test begins",
+                "1 - sin(phi) is that of normally consolidated soil",
             )
         most = abs(_edge(lambda value: carried(sigma_v0, K0, value), 0.0, static_shear_ratio))
         raise InvalidInput(
@@ -127,6 +131,7 @@ def consolidated(
             static_shear_ratio,
             f"must lie in [-{most:.3f}, {most:.3f}] at K0 = {K0:g}: beyond it this soil fails before the "
             "test begins",
+            "a K0 nearer to 1 leaves room for more",
         )
     return specimen(where, soil, stress(sigma_v0, K0, static_shear_ratio), void_ratio, integrator, tolerance)
 
@@ -165,6 +170,7 @@ def under_stress(
             shown,
             f"must be {_edge(carried, 0.0, 1.0):.3f} times that far from isotropic, or nearer: "
             "this soil carries no more",
+            "take normal stresses nearer to each other, or less shear stress",
         )
     return specimen(where, soil, (xx, yy, xy, zz), void_ratio, integrator, tolerance)
 
@@ -178,6 +184,8 @@ def specimen(
     tolerance: float | None,
 ) -> _core.Specimen:
     """A specimen under an effective stress `(xx, yy, xy, zz)`, kPa, tension positive."""
+    if not isinstance(soil, PM4Sand):
+        _refuse_idle(where, soil, void_ratio, integrator, tolerance)
     if tolerance is not None and integrator != "default":
         raise InvalidInput(
             f"{where}.tolerance",
@@ -196,6 +204,25 @@ def specimen(
             )
     material = soil.core() if isinstance(soil, _OURS) else soil
     return _core.Specimen(material, stress, void_ratio, scheme=integrator, tolerance=tolerance)
+
+
+def _refuse_idle(
+    where: str, soil: Soil, void_ratio: float | None, integrator: str, tolerance: float | None
+) -> None:
+    """Refuse what would be said in vain of a soil other than PM4Sand."""
+    name = type(soil).__name__
+    ours = isinstance(soil, _OURS)
+    reason = "is integrated in closed form" if ours else "integrates as it likes"
+    for argument, value, default, told in (
+        # A model of one's own is given the void ratio.
+        ("void_ratio", void_ratio, void_ratio if not ours else None, f"{name} has none"),
+        ("integrator", integrator, "default", f"{name} {reason}"),
+        ("tolerance", tolerance, None, f"{name} {reason}"),
+    ):
+        if value != default:
+            raise InvalidInput(
+                f"{where}.{argument}", value, f"has no effect: {told}", "leave it out; PM4Sand takes it"
+            )
 
 
 def carries(soil: Soil, stress: Components) -> bool:

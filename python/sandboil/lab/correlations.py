@@ -36,7 +36,9 @@ def _within(name: str, value: float, low: float, high: float, meaning: str) -> f
     except ValueError:
         number = math.nan
     if not low < number <= high or math.isinf(number):
-        raise InvalidInput(f"correlations.{name}", value, f"must be above {low:g}{upper} ({meaning})")
+        raise InvalidInput(
+            f"correlations.{name}", value, f"must be above {low:g}{upper} ({meaning})", "check its unit"
+        )
     return number
 
 
@@ -64,6 +66,7 @@ def relative_density_from_cpt(qc1Ncs: float) -> float:
             "correlations.qc1Ncs",
             qc1Ncs,
             "must give a relative density above 0 and at most 1, that is 21 to 254",
+            "it is the cone resistance over one atmosphere, not in MPa",
         )
     return density
 
@@ -93,7 +96,12 @@ def k_sigma(sigma_v0: float, *, N160cs: float | None = None, qc1Ncs: float | Non
     """
     overburden = _overburden(sigma_v0)
     if (N160cs is None) == (qc1Ncs is None):
-        raise InvalidInput("correlations.k_sigma", (N160cs, qc1Ncs), "needs exactly one of N160cs and qc1Ncs")
+        raise InvalidInput(
+            "correlations.k_sigma",
+            (N160cs, qc1Ncs),
+            "needs exactly one of N160cs and qc1Ncs",
+            "leave the other out",
+        )
     if N160cs is not None:
         n = _within("N160cs", N160cs, 0.0, _N_MAX, "clean-sand corrected blow count")
         slope = 18.9 - 2.55 * math.sqrt(n)
@@ -120,6 +128,7 @@ def k_alpha(static_shear_ratio: float, *, Dr: float, sigma_v0: float, K0: float 
             "correlations.static_shear_ratio",
             static_shear_ratio,
             f"must lie in [-{_ALPHA_MAX}, {_ALPHA_MAX}] (static shear stress over sigma_v0)",
+            "the relation was fitted up to there",
         )
     density = _within("Dr", Dr, 0.0, 1.0, "relative density, fraction")
     earth_pressure = _within("K0", K0, 0.0, math.inf, "horizontal over vertical effective stress")
@@ -149,7 +158,12 @@ def estimates(
         name for name, value in {"N160cs": N160cs, "qc1Ncs": qc1Ncs, "Dr": Dr}.items() if value is not None
     ]
     if len(given) != 1:
-        raise InvalidInput("correlations.estimates", given, "needs exactly one of N160cs, qc1Ncs and Dr")
+        raise InvalidInput(
+            "correlations.estimates",
+            given,
+            "needs exactly one of N160cs, qc1Ncs and Dr",
+            "choose the test that you trust most",
+        )
     if qc1Ncs is not None:
         density = relative_density_from_cpt(qc1Ncs)
     elif N160cs is not None:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from .._errors import InvalidInput, nearest_name
+from .._input_file import read_bytes
 from ._series import (
     MAX_DT,
     MAX_SAMPLES,
@@ -22,8 +25,8 @@ from ._series import (
     positive,
 )
 
-# Text of a record: 100 MB hold MAX_SAMPLES rows of a CSV with three columns of full precision.
-MAX_FILE_BYTES = 100_000_000
+# Longest line taken, characters: some thousand columns; what a line is split into takes many times its text.
+MAX_LINE = 100_000
 # An .AT2 says its number of points within this many lines (four, in PEER's own).
 MAX_HEADER_LINES = 50
 # A step of the time column may differ from the others by this fraction of it: rounded decimals differ
@@ -43,9 +46,10 @@ UNITS: dict[str, tuple[Quantity, float]] = {
     "m/s": ("velocity", 1.0),
 }
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?"
+_UNSIGNED = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[EeDd][-+]?\d+)?"
+_NUMBER = rf"[-+]?{_UNSIGNED}"
 # Fortran columns filled to their width: each further number shows by its sign.
-_TOUCHING = re.compile(rf"{_NUMBER}(?:[-+](?:\d+\.?\d*|\.\d+)(?:[EeDd][-+]?\d+)?)+")
+_TOUCHING = re.compile(rf"{_NUMBER}(?:[-+]{_UNSIGNED})+")
 _EACH = re.compile(_NUMBER)
 _NOT_FINITE = re.compile(r"[-+]?(nan|inf|infinity)", re.IGNORECASE)
 _NPTS = re.compile(r"\bNPTS\s*[=:]\s*([^\s,=]+)", re.IGNORECASE)
@@ -74,19 +78,22 @@ class Record:
 def read_at2(path: str | os.PathLike[str]) -> Record:
     """Read a PEER .AT2 acceleration; see :meth:`Motion.from_at2`."""
     name = os.fspath(path)
-    lines = _text(name).splitlines()
-    header_end, points, dt = _at2_header(name, lines)
-    unit = _at2_unit(name, lines[:header_end])
+    lines = _lines(name)
+    header, points, dt = _at2_header(name, lines)
+    unit = _at2_unit(name, header)
 
     values: list[float] = []
     line_of: list[int] = []
-    for number, line in enumerate(lines[header_end:], start=header_end + 1):
+    for number, line in lines:
         row = _at2_row(name, number, line, started=bool(values))
         values.extend(row)
         line_of.extend([number] * len(row))
         if len(values) > MAX_SAMPLES:
             raise InvalidInput(
-                f"{name}, line {number}", len(values), f"at most {MAX_SAMPLES} points are taken"
+                f"{name}, line {number}",
+                len(values),
+                f"at most {MAX_SAMPLES} points are taken",
+                "cut or thin the record",
             )
     if len(values) != points:
         raise InvalidInput(
@@ -102,14 +109,17 @@ def read_at2(path: str | os.PathLike[str]) -> Record:
     return Record(dt, quantity, samples, unit)
 
 
-def _at2_header(name: str, lines: list[str]) -> tuple[int, int, float]:
-    """Number of header lines, points and spacing: the header ends with the line that holds NPTS and DT."""
-    for number, line in enumerate(lines[:MAX_HEADER_LINES], start=1):
-        last = _NPTS_DT_LAST.search(line)
+def _at2_header(name: str, lines: Iterator[tuple[int, str]]) -> tuple[list[str], int, float]:
+    """Header, number of points and spacing: the header ends with the line that holds NPTS and DT."""
+    header: list[str] = []
+    for number, line in islice(lines, MAX_HEADER_LINES):
+        # Single blanks: the patterns allow for any number in several places.
+        header.append(" ".join(line.split()))
+        last = _NPTS_DT_LAST.search(header[-1])
         if last:
             points_text, dt_text = last.groups()
         else:
-            points_found, dt_found = _NPTS.search(line), _DT.search(line)
+            points_found, dt_found = _NPTS.search(header[-1]), _DT.search(header[-1])
             if not (points_found and dt_found):
                 continue
             points_text, dt_text = points_found[1], dt_found[1]
@@ -125,10 +135,10 @@ def _at2_header(name: str, lines: list[str]) -> tuple[int, int, float]:
                 f"must lie between 2 and {MAX_SAMPLES}",
                 "take a whole copy of the record",
             )
-        return number, points, _record_dt(f"{place}, DT", _SECONDS.sub("", dt_text))
+        return header, points, _record_dt(f"{place}, DT", _SECONDS.sub("", dt_text))
     raise InvalidInput(
         name,
-        lines[3] if len(lines) > 3 else "",
+        header[3] if len(header) > 3 else "",
         f'must hold a line like "NPTS=   7990, DT=  0.0050 SEC" among its first {MAX_HEADER_LINES}',
         "if it is no PEER .AT2 file, write it as CSV with a header row",
     )
@@ -205,7 +215,7 @@ def _at2_row(name: str, number: int, line: str, started: bool) -> list[float]:
 def read_csv(path: str | os.PathLike[str], unit: str | None, column: str | int | None) -> Record:
     """Read one column of a CSV; see :meth:`Motion.from_csv`."""
     name = os.fspath(path)
-    rows = _csv_rows(_text(name))
+    rows = _csv_rows(name)
     header_line, header = next(rows, (1, []))
     if len(header) < 2 or any(_EACH.fullmatch(cell) for cell in header):
         raise InvalidInput(
@@ -216,7 +226,8 @@ def read_csv(path: str | os.PathLike[str], unit: str | None, column: str | int |
         )
     unit = unit if unit is None else _plain_unit(unit) or unit
     if unit is not None and unit not in UNITS:
-        raise InvalidInput("unit", unit, f"must be one of {', '.join(UNITS)}", _did_you_mean(unit, UNITS))
+        told = _did_you_mean(unit, UNITS) or "convert the record to one of them"
+        raise InvalidInput("unit", unit, f"must be one of {', '.join(UNITS)}", told)
     time_at = next((i for i, cell in enumerate(header) if _TIME_COLUMN.match(cell)), 0)
     value_at = _value_column(name, header, time_at, unit, column)
     unit = _csv_unit(name, header[value_at], unit)
@@ -230,6 +241,7 @@ def read_csv(path: str | os.PathLike[str], unit: str | None, column: str | int |
                 f"{name}, line {number}",
                 ",".join(cells),
                 f"must have {len(header)} columns as the header has",
+                "repair the line or take another copy",
             )
         for target, at in ((times, time_at), (values, value_at)):
             try:
@@ -244,10 +256,15 @@ def read_csv(path: str | os.PathLike[str], unit: str | None, column: str | int |
         line_of.append(number)
         if len(values) > MAX_SAMPLES:
             raise InvalidInput(
-                f"{name}, line {number}", len(values), f"at most {MAX_SAMPLES} points are taken"
+                f"{name}, line {number}",
+                len(values),
+                f"at most {MAX_SAMPLES} points are taken",
+                "cut or thin the record",
             )
     if len(values) < 2:
-        raise InvalidInput(f"{name}, number of points", len(values), "must be at least 2")
+        raise InvalidInput(
+            f"{name}, number of points", len(values), "must be at least 2", "take a whole copy of the record"
+        )
     dt = _uniform_step(name, np.array(times), line_of)
     quantity, factor = UNITS[unit]
     samples = ground_motion(
@@ -261,10 +278,10 @@ def read_csv(path: str | os.PathLike[str], unit: str | None, column: str | int |
     return Record(dt, quantity, samples, unit)
 
 
-def _csv_rows(text: str) -> Iterator[tuple[int, list[str]]]:
+def _csv_rows(name: str) -> Iterator[tuple[int, list[str]]]:
     """Line numbers and stripped cells; comment lines (#) and blank ones are passed over."""
     delimiter = None
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in _lines(name):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         if delimiter is None:
@@ -281,6 +298,7 @@ def _value_column(
                 f"{name}, column",
                 column,
                 f"must be the number (from 0) of a column of {header} that is not time",
+                "or name the column",
             )
         return column
     if column is not None:
@@ -290,7 +308,7 @@ def _value_column(
                 f"{name}, column",
                 column,
                 f"must be one of {', '.join(header)}",
-                _did_you_mean(column, header),
+                _did_you_mean(column, header) or "columns are named by the file's header",
             )
         return lowered.index(column.lower())
     wanted = _VELOCITY_COLUMN if unit is not None and UNITS[unit][0] == "velocity" else _ACCELERATION_COLUMN
@@ -354,23 +372,25 @@ def _did_you_mean(name: str, candidates: dict[str, tuple[Quantity, float]] | lis
     return f'did you mean "{nearest}"?' if nearest else None
 
 
-def _text(name: str) -> str:
-    try:
-        size = Path(name).stat().st_size
-        if size > MAX_FILE_BYTES:
-            raise InvalidInput(name, f"{size} bytes", f"must not exceed {MAX_FILE_BYTES} bytes")
-        content = Path(name).read_bytes()
-    except OSError as error:
-        raise InvalidInput(
-            "motion file", name, f"cannot be read: {error.strerror}", "check the path"
-        ) from error
+def _lines(name: str) -> Iterator[tuple[int, str]]:
+    """The lines of a file, numbered from 1."""
+    content = read_bytes(name, "motion file", "record, .AT2 or CSV")
     if b"\0" in content:
         raise InvalidInput("motion file", name, "must be text", "this is a binary file: export it as CSV")
     try:
-        return content.decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         # Old headers name their stations in Latin-1, in which every byte is a letter.
-        return content.decode("latin-1")
+        text = content.decode("latin-1")
+    for number, line in enumerate(io.StringIO(text, newline=None), start=1):
+        if len(line) > MAX_LINE:
+            raise InvalidInput(
+                f"{name}, line {number}",
+                f"{len(line)} characters",
+                f"must not exceed {MAX_LINE} characters",
+                "this is no record, or its line breaks are lost: export it anew",
+            )
+        yield number, line
 
 
 def write_at2(path: str | os.PathLike[str], dt: float, acceleration_g: Array, title: str) -> None:

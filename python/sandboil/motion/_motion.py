@@ -83,12 +83,18 @@ class Motion:
                 "motion",
                 "neither" if velocity is None else "both",
                 "must have one of acceleration_g and velocity",
+                "the other follows from it",
             )
         quantity: Quantity = "velocity" if acceleration_g is None else "acceleration_g"
         samples = velocity if acceleration_g is None else acceleration_g
         spacing = positive("motion.dt", dt, "seconds")
         if isinstance(dt, bool) or spacing > MAX_DT:
-            raise InvalidInput("motion.dt", dt, f"must be a number of seconds, at most {MAX_DT:g}")
+            raise InvalidInput(
+                "motion.dt",
+                dt,
+                f"must be a number of seconds, at most {MAX_DT:g}",
+                "it is probably in milliseconds",
+            )
         self.__dict__.update(
             dt=spacing,
             kind=_kind(kind),

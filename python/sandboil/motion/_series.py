@@ -34,7 +34,7 @@ MAX_DT = 0.5
 PADDING_PER_ORDER = 1.5
 
 
-def positive(path: str, value: Any, unit: str, hint: str | None = None) -> float:
+def positive(path: str, value: Any, unit: str, hint: str = "check its unit and its sign") -> float:
     """`value` as a float, or InvalidInput unless it is a finite number above zero."""
     try:
         number = float(value)
@@ -57,11 +57,23 @@ def finite_series(values: Any, name: str, where: Callable[[int], str]) -> Array:
     try:
         series = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InvalidInput(name, type(values).__name__, "must be an array of numbers") from error
+        raise InvalidInput(
+            name, type(values).__name__, "must be an array of numbers", "for example [0.0, 0.1, 0.0]"
+        ) from error
     if series.ndim != 1:
-        raise InvalidInput(f"{name}.shape", series.shape, "must be one-dimensional, one number per time")
+        raise InvalidInput(
+            f"{name}.shape",
+            series.shape,
+            "must be one-dimensional, one number per time",
+            "take one component of the record",
+        )
     if not 2 <= series.size <= MAX_SAMPLES:
-        raise InvalidInput(f"{name}.size", series.size, f"must lie between 2 and {MAX_SAMPLES}")
+        raise InvalidInput(
+            f"{name}.size",
+            series.size,
+            f"must lie between 2 and {MAX_SAMPLES}",
+            "take the whole record, and no more than the earthquake",
+        )
     bad = np.flatnonzero(~np.isfinite(series))
     if bad.size:
         at = int(bad[0])
@@ -142,7 +154,12 @@ def butterworth(series: Array, dt: float, low: float | None, high: float | None,
     """
     nyquist = 0.5 / dt
     if low is None and high is None:
-        raise InvalidInput("filtered(low, high)", (low, high), "at least one corner frequency, Hz, is needed")
+        raise InvalidInput(
+            "filtered(low, high)",
+            (low, high),
+            "at least one corner frequency, Hz, is needed",
+            "for example low = 0.1 against drift, or high = 25",
+        )
     corners = [
         positive(f"filtered({name})", value, "Hz")
         for name, value in (("low", low), ("high", high))
@@ -153,9 +170,12 @@ def butterworth(series: Array, dt: float, low: float | None, high: float | None,
             "filtered(low, high)",
             (low, high),
             f"must lie below the Nyquist frequency 1/(2 dt) = {nyquist:.6g} Hz",
+            "the record holds nothing above it",
         )
     if len(corners) == 2 and corners[0] >= corners[1]:
-        raise InvalidInput("filtered(low, high)", (low, high), "low must be below high: those between pass")
+        raise InvalidInput(
+            "filtered(low, high)", (low, high), "low must be below high: those between pass", "exchange them"
+        )
     band = "bandpass" if len(corners) == 2 else "highpass" if high is None else "lowpass"
     sections = butter(order, corners if len(corners) == 2 else corners[0], band, fs=1.0 / dt, output="sos")
     padding = min(math.ceil(PADDING_PER_ORDER * order / (corners[0] * dt)), MAX_SAMPLES)

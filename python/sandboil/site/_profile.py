@@ -226,7 +226,12 @@ def profile(
     x0, _, x1, _ = scene.bounds
     wanted = 0.5 * (x0 + x1) if x is None else x
     if not x0 <= wanted <= x1:
-        raise InvalidInput("scene.profile.x", x, f"must lie in the section, [{x0:g}, {x1:g}] m")
+        raise InvalidInput(
+            "scene.profile.x",
+            x,
+            f"must lie in the section, [{x0:g}, {x1:g}] m",
+            "leave it out for the middle",
+        )
     particles = discretise(scene)
     across, up = particles.position.T
     distance = np.abs(across - wanted)
