@@ -137,7 +137,9 @@ def test_an_unwritable_folder_is_refused(scene_file: Path, tmp_path: Path) -> No
 
 def test_a_motion_that_cannot_be_read_is_refused(scene_file: Path, tmp_path: Path) -> None:
     none = tmp_path / "none.AT2"
-    assert "must be a readable record" in refused("run", scene_file, "--out", tmp_path / "out", "--motion", none)
+    assert "must be a readable record" in refused(
+        "run", scene_file, "--out", tmp_path / "out", "--motion", none
+    )
     assert "belongs to a --motion" in refused("plan", scene_file, "--unit", "g")
     assert not (tmp_path / "out").exists()
 

@@ -11,7 +11,7 @@ use crate::{
     error::SolverError,
     geometry::{Geometry, stress_node_positions},
     model::{Conductivity, Model, Numerics, Region, STRESS_NODES, positive},
-    parallel::{Rows, chunks, for_each_chunk},
+    parallel::{Pool, Rows, chunks, for_each_chunk},
     simulation::{CHECK_INTERVAL, Counters, RUNAWAY_SPEED, SHAKING_FACTOR, step_is_outgrown},
     skeleton::{NodalShare, StressPoint, conservative_force, local_damping, motion},
     soil_field::SoilField,
@@ -307,7 +307,7 @@ pub struct ShearCell {
     dt: f64,
     counters: Counters,
     threads: usize,
-    pool: Option<rayon::ThreadPool>,
+    pool: Pool,
 }
 
 impl ShearCell {
@@ -335,10 +335,7 @@ impl ShearCell {
         };
         let mut points = vec![point; STRESS_NODES * computed];
         let soil = SoilField::plastic(&first_nodes(&model, computed), &mut points, test.void_ratio)?;
-        let pool = (threads > 1)
-            .then(|| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
-            .transpose()
-            .map_err(|error| SolverError::Threads { threads, reason: error.to_string() })?;
+        let pool = Pool::new(threads)?;
         let spectrum = PressureSpectrum::new(&model);
         let mut cell = Self {
             servo: Servo {
@@ -392,11 +389,8 @@ impl ShearCell {
     /// # Errors
     /// [`SolverError::Diverged`] or [`SolverError::Soil`]; the state stays readable.
     pub fn advance(&mut self, steps: usize) -> Result<bool, SolverError> {
-        let pool = self.pool.take();
-        let outcome = match &pool {
-            Some(pool) => pool.install(|| self.run(steps)),
-            None => self.run(steps),
-        };
+        let mut pool = std::mem::take(&mut self.pool);
+        let outcome = pool.run(|| self.run(steps)).flatten();
         self.pool = pool;
         if outcome.is_err() {
             self.record.keep(self.now);

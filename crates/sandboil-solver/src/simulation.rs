@@ -14,7 +14,7 @@ use crate::{
     free_field::{FreeField, Section},
     geometry::{Geometry, consistent_gradient, point_weights, stress_node_positions, stress_node_values},
     model::{AccelerationTerm, Diffusion, Model, Operators, STRESS_NODES},
-    parallel::{Rows, chunks, for_each_chunk},
+    parallel::{Pool, Rows, chunks, for_each_chunk},
     phases::Phases,
     rayleigh::{Rayleigh, RayleighDamping},
     record::{Probes, Recorder},
@@ -162,7 +162,7 @@ pub struct Simulation {
     #[serde(skip)]
     threads: usize,
     #[serde(skip)]
-    pool: Option<rayon::ThreadPool>,
+    pool: Pool,
     geometry: Geometry,
     walls: Walls,
     edges: EdgeNodes,
@@ -207,7 +207,7 @@ impl Simulation {
         model.validate()?;
         let (model, order) = sorted(model);
         let nodes = model.nodes();
-        let pool = thread_pool(threads)?;
+        let pool = Pool::new(threads)?;
         let phases = Phases::new(&model);
         let walls = Walls::statics(&model.outline);
         let outline = (&model.outline, walls);
@@ -282,7 +282,7 @@ impl Simulation {
         if simulation.model != sorted(model).0 {
             return Err(StateError::OtherModel.into());
         }
-        (simulation.threads, simulation.pool) = (threads, thread_pool(threads)?);
+        (simulation.threads, simulation.pool) = (threads, Pool::new(threads)?);
         Ok(simulation)
     }
 
@@ -834,14 +834,11 @@ impl Simulation {
         if matches!(self.active, Active::None) {
             return Err(SolverError::Order { call: "advance", needs: "a stage" });
         }
-        let pool = self.pool.take();
-        let outcome = match &pool {
-            Some(pool) => pool.install(|| self.run(steps, until)),
-            None => self.run(steps, until),
-        };
+        let mut pool = std::mem::take(&mut self.pool);
+        let outcome = pool.run(|| self.run(steps, until));
         self.pool = pool;
         // Nobody sees, keeps or goes on from a state that is no longer one.
-        let done = outcome?;
+        let done = outcome??;
         self.guard()?;
         Ok(done)
     }
@@ -1513,14 +1510,6 @@ impl Simulation {
             _ => (Vec::new(), Vec::new()),
         }
     }
-}
-
-/// Threads that share the work; one needs no pool.
-fn thread_pool(threads: usize) -> Result<Option<rayon::ThreadPool>, SolverError> {
-    (threads > 1)
-        .then(|| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
-        .transpose()
-        .map_err(|error| SolverError::Threads { threads, reason: error.to_string() })
 }
 
 /// Whether a time step is too far from its target to be kept.
