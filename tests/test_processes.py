@@ -92,6 +92,7 @@ def test_simulations_in_threads_are_as_alone(alone: dict[float, Fields]) -> None
 def test_python_goes_on_while_the_core_computes() -> None:
     """Were Python held, this thread had one turn at each look of the core for whoever wants to stop it."""
     simulation = Simulation(ground(), threads=2)
+    simulation.run_stage()
     thread = threading.Thread(target=simulation.run_stage)
     turns, start = 0, time.monotonic()
     thread.start()

@@ -13,9 +13,9 @@ use pyo3::{
 };
 use sandboil_solver as solver;
 use std::{
-    fs::{self, File},
-    io::{self, BufWriter},
-    path::PathBuf,
+    fs::File,
+    io::{self, BufWriter, Read},
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
@@ -225,11 +225,28 @@ pub fn stress_node_offset(dx: f64, dy: f64) -> (f64, f64) {
     (offset.x, offset.y)
 }
 
+/// Most bytes of a state that are read: a section of ten million nodes, the largest that a scene may have, takes some
+/// 5 kB for each.
+const MAX_STATE_BYTES: u64 = 1 << 36;
+
+/// The bytes of a stored state; the first ones alone if they are not those of one, before memory is taken for the rest.
+fn stored(path: &Path) -> io::Result<Vec<u8>> {
+    let file = File::open(path)?;
+    let mut bytes = Vec::new();
+    (&file).take(solver::state::MAGIC.len() as u64).read_to_end(&mut bytes)?;
+    if bytes == solver::state::MAGIC {
+        let rest = file.metadata()?.len().min(MAX_STATE_BYTES);
+        bytes.reserve_exact(usize::try_from(rest).unwrap_or_default());
+        (&file).take(MAX_STATE_BYTES).read_to_end(&mut bytes)?;
+    }
+    Ok(bytes)
+}
+
 /// The note that was stored with a state in a file, whichever build wrote it.
 #[pyfunction]
 #[allow(clippy::needless_pass_by_value)] // PyO3 gives paths as owned values only
 pub fn stored_note(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyBytes>> {
-    let bytes = py.detach(|| fs::read(&path))?;
+    let bytes = py.detach(|| stored(&path))?;
     match py.detach(|| solver::state::note(&bytes)) {
         Ok(note) => Ok(PyBytes::new(py, note)),
         Err(error) => Err(state_error(py, &path, &error)?),
@@ -274,7 +291,7 @@ impl Simulation {
     ) -> PyResult<Self> {
         let model = model(description)?;
         let restored = py.detach(|| -> io::Result<_> {
-            Ok(solver::Simulation::restore(&model, threads, &fs::read(&path)?))
+            Ok(solver::Simulation::restore(&model, threads, &stored(&path)?))
         });
         match restored? {
             Ok(inner) => Ok(Self { inner }),

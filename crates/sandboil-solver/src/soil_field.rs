@@ -103,7 +103,7 @@ struct Outcome {
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct SoilField {
     groups: Vec<Group>,
-    /// Of the chunks of a group, in a step; as many as the longest had so far.
+    /// Of the chunks of the longest group, in a step. A field that was restored has none before its first step.
     #[serde(skip)]
     outcomes: Vec<Outcome>,
 }
@@ -272,8 +272,9 @@ impl SoilField {
         let groups = groups(model)
             .into_iter()
             .map(|(region, rows)| Ok(Group { region, law: law(region, rows.clone())?, rows }))
-            .collect::<Result<_, SolverError>>()?;
-        Ok(Self { groups, outcomes: Vec::new() })
+            .collect::<Result<Vec<_>, SolverError>>()?;
+        let longest = groups.iter().map(|group| group.rows.len()).max().unwrap_or(0);
+        Ok(Self { groups, outcomes: vec![Outcome::default(); chunks(longest)] })
     }
 
     /// Moves every stress node through one step: strain from the velocity field, stress from the soil model,

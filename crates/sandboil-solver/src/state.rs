@@ -18,7 +18,8 @@ use crc32fast::Hasher;
 use serde::{Serialize, de::DeserializeOwned};
 use std::io::{self, Write};
 
-const MAGIC: &[u8] = b"SANDBOIL";
+/// What the bytes of every state begin with.
+pub const MAGIC: &[u8] = b"SANDBOIL";
 /// Raised when what stands around a simulation changes.
 const FORMAT_VERSION: u32 = 1;
 
