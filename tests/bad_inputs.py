@@ -176,6 +176,12 @@ def shaken(**given: object) -> Slip:
     return slope(to(SHAKING, {"kind": "shaking", "motion": pulse, "duration": 5.0} | given))
 
 
+def moving(conditions: list[dict[str, Any]], *changes: Change) -> Slip:
+    """Water under conditions while the ground shakes, after changes."""
+    shaking = {"kind": "shaking", "duration": 5.0, "conditions": conditions}
+    return seeping(to("stages", [{"kind": "gravity"}, shaking]), *changes)
+
+
 LEFT = {"kind": "head", "on": "left", "head": 4.0}
 WAVY = {"ratio": 0.005, "frequencies": [1.0, 10.0]}
 
@@ -547,6 +553,20 @@ CATALOGUE: dict[str, dict[str, Slip]] = {
         "in ground that lets nothing through": seeping(without(f"{SOIL}.hydraulic_conductivity")),
         "condition on a periodic side": seeping(without("sides")),
         "points on a periodic side": seeping(without("sides"), to(f"{FIRST}.on", [[0.0, 0.0], [0.0, 4.0]])),
+    },
+    "water while the ground moves": {
+        "in dry ground": shaken(conditions=[LEFT]),
+        "in ground that lets nothing through": moving([LEFT], without(f"{SOIL}.hydraulic_conductivity")),
+        "into soil that is dry above the water": moving(
+            [{"kind": "rain", "on": "surface", "rate": 1e-6}],
+            to("water_table", {"elevation": 2.0, "above": "dry"}),
+        ),
+        "on a free-field side": moving([LEFT], to("sides", {"kind": "free-field"})),
+        "that changes beside free-field sides": moving(
+            [{"kind": "head", "on": "surface", "head": [[0.0, 4.0], [1.0, 6.0]]}],
+            to("sides", {"kind": "free-field"}),
+        ),
+        "on no edge": moving([LEFT | {"on": "top"}]),
     },
     "base and sides": {
         "sides of an unknown kind": level(to("sides", {"kind": "periodc"})),

@@ -147,9 +147,7 @@ class Model(BaseModel):
             return InvalidInput(path, value, told, remedy or "find out where it comes from")
         if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
             told = _range(field)
-            return InvalidInput(
-                path, value, told + _described(field), remedy or "check its unit and its sign"
-            )
+            return InvalidInput(path, value, told + _described(field), remedy or _usual(field))
         if kind in ("model_type", "model_attributes_type"):
             name = context.get("class_name")
             told = f"must be {f'a {name}' if name else 'an object of sandboil'} or a table"
@@ -196,14 +194,32 @@ def _meant(name: object, candidates: list[str]) -> str | None:
     return f"did you mean {nearest!r}?" if nearest else None
 
 
+def _infos(field: FieldInfo | None) -> list[FieldInfo]:
+    """What is said of a field: of itself, and of the members of its union."""
+    if field is None:
+        return []
+    parts = typing.get_args(field.annotation)
+    inner = [item for part in parts for item in getattr(part, "__metadata__", ())]
+    return [field, *(item for item in inner if isinstance(item, FieldInfo))]
+
+
 def _described(field: FieldInfo | None) -> str:
-    return f" ({field.description})" if field is not None and field.description else ""
+    return next((f" ({info.description})" for info in _infos(field) if info.description), "")
 
 
 def field_remedy(field: FieldInfo | None) -> str | None:
     """What to do about a value that a field refuses, where the field says it."""
-    extra = field.json_schema_extra if field is not None else None
-    return str(extra["remedy"]) if isinstance(extra, dict) and "remedy" in extra else None
+    extras = [info.json_schema_extra for info in _infos(field)]
+    return next(
+        (str(extra["remedy"]) for extra in extras if isinstance(extra, dict) and "remedy" in extra), None
+    )
+
+
+def _usual(field: FieldInfo | None) -> str:
+    """What may be done about a number that lies outside its range."""
+    if field is not None and isinstance(field.default, (int, float)):
+        return f"leave it out for {field.default:g}"
+    return "check its unit and its sign"
 
 
 def _range(field: FieldInfo | None) -> str:

@@ -6,6 +6,7 @@ in Python can be said in TOML with the same names, where `kind` takes the place 
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -525,7 +526,9 @@ class Shaking(Model):
         default=None, description="s", json_schema_extra={"remedy": "leave it out for that of the motion"}
     )
     rayleigh: Rayleigh | None = None
-    conditions: Many[Condition] | None = Field(default=None, description="left out: as before")
+    conditions: Annotated[Many[Condition], Field(max_length=MAX_PARTS)] | None = Field(
+        default=None, description="left out: as before"
+    )
 
     if TYPE_CHECKING:
 
@@ -1160,10 +1163,13 @@ class Scene(Model):
 
     def _check_shared_edges(self, stage: Seepage | Shaking, path: str) -> None:
         """No stretch of edge may obey two conditions."""
-        edges = [(k, c) for k, c in enumerate(stage.conditions or ()) if not isinstance(c, Drain)]
-        for (k, one), (m, other) in itertools.combinations(edges, 2):
-            reach = shapely.buffer(self.condition_line(one), COORDINATE_TOLERANCE)
-            common = self.condition_line(other).intersection(reach)
+        edges = []
+        for k, condition in enumerate(stage.conditions or ()):
+            if not isinstance(condition, Drain):
+                line = self.condition_line(condition)
+                edges.append((k, condition, line, shapely.buffer(line, COORDINATE_TOLERANCE)))
+        for (k, _, _, reach), (m, other, line, _) in itertools.combinations(edges, 2):
+            common = line.intersection(reach)
             # Lines that meet share the reach of their ends.
             if common.length > 4.0 * COORDINATE_TOLERANCE:
                 x0, y0, x1, y1 = common.bounds
@@ -1406,12 +1412,12 @@ class Scene(Model):
     @property
     def section(self) -> BaseGeometry:
         """All regions joined, as shapely geometry."""
-        return shapely.union_all([region.geometry for region in self.regions], grid_size=COORDINATE_TOLERANCE)
+        return _joined(tuple(region.shape for region in self.regions))
 
     @property
     def outline(self) -> Outline:
         """Base, sides and ground surface of the section."""
-        return Outline.of(self.section)
+        return _outlined(tuple(region.shape for region in self.regions))
 
     @property
     def side_kinds(self) -> tuple[str, str]:
@@ -1710,6 +1716,19 @@ class Scene(Model):
         scene = cls(**_toml.parse(text, "scene", origin))
         stages = tuple(_anchored(stage, folder) for stage in scene.stages)
         return scene.model_copy(update={"stages": stages})
+
+
+# A scene asks for these again and again; scenes made of one another mostly share them.
+@functools.lru_cache(maxsize=8)
+def _joined(shapes: tuple[Box | Polygon, ...]) -> BaseGeometry:
+    """Shapes joined into one."""
+    return shapely.union_all([shape.geometry for shape in shapes], grid_size=COORDINATE_TOLERANCE)
+
+
+@functools.lru_cache(maxsize=8)
+def _outlined(shapes: tuple[Box | Polygon, ...]) -> Outline:
+    """Edges of the section that shapes make together."""
+    return Outline.of(_joined(shapes))
 
 
 def _passage(base: CompliantBase) -> str:

@@ -114,9 +114,26 @@ EarthPressure = Annotated[
         json_schema_extra={"remedy": "0.4 to 1 in most ground"},
     ),
 ]
-Ratio = Annotated[Number, Field(gt=0.0, description="cyclic shear stress over sigma_v0")]
+Ratio = Annotated[
+    Number,
+    Field(
+        gt=0.0,
+        description="cyclic shear stress over sigma_v0",
+        json_schema_extra={"remedy": "a ratio, not a stress: 0.05 to 0.5 for sand"},
+    ),
+]
 Bias = Annotated[Number, Field(description="static shear stress over sigma_v0")]
-VoidRatio = Annotated[Number, Field(gt=0.0, description="void ratio at the start of the test")] | None
+VoidRatio = (
+    Annotated[
+        Number,
+        Field(
+            gt=0.0,
+            description="void ratio at the start of the test",
+            json_schema_extra={"remedy": "leave it out for the soil's own"},
+        ),
+    ]
+    | None
+)
 Limit = Annotated[
     Number,
     Field(
@@ -126,11 +143,27 @@ Limit = Annotated[
         json_schema_extra={"remedy": "it is a fraction, not a percentage: 5 % is written 0.05"},
     ),
 ]
-AxialStrain = Annotated[Number, Field(gt=0.0, lt=_STRAIN_MAX, description="compression, 1")]
+AxialStrain = Annotated[
+    Number,
+    Field(
+        gt=0.0,
+        lt=_STRAIN_MAX,
+        description="compression, 1",
+        json_schema_extra={"remedy": "it is a fraction, not a percentage: 5 % is written 0.05"},
+    ),
+]
 Count = Annotated[int, BeforeValidator(_as_integer), Field(ge=1, le=_COUNT_MAX)]
 Integrator = Literal["default", "rk4", "reference"]
 Tolerance = (
-    Annotated[Number, Field(gt=0.0, le=_TOLERANCE_MAX, description="of the default integrator, relative")]
+    Annotated[
+        Number,
+        Field(
+            gt=0.0,
+            le=_TOLERANCE_MAX,
+            description="of the default integrator, relative",
+            json_schema_extra={"remedy": "leave it out for 1e-5; above the range cycle counts are biased"},
+        ),
+    ]
     | None
 )
 Series = Annotated[ArrayLike, PlainValidator(as_series)]

@@ -31,7 +31,14 @@ from ._resistance import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Target = Annotated[Number, Field(gt=0.0, description="cyclic resistance ratio")]
+Target = Annotated[
+    Number,
+    Field(
+        gt=0.0,
+        description="cyclic resistance ratio",
+        json_schema_extra={"remedy": "0.05 to 0.6; sb.lab.correlations has it from SPT and CPT"},
+    ),
+]
 
 # Contraction rates between which the answer is looked for: beyond, sand does not contract, or only that.
 _HPO_RANGE = (1e-3, 50.0)

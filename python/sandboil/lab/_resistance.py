@@ -70,7 +70,15 @@ def _as_ratios(value: object) -> Floats:
 
 Ratios = Annotated[ArrayLike, PlainValidator(_as_ratios)]
 Cycles = Annotated[Number, Field(gt=0.5, le=_CYCLES_MAX, description="uniform cycles")]
-PressureRatio = Annotated[Number, Field(gt=0.0, le=1.0, description="excess pore pressure ratio, 1")]
+PressureRatio = Annotated[
+    Number,
+    Field(
+        gt=0.0,
+        le=1.0,
+        description="excess pore pressure ratio, 1",
+        json_schema_extra={"remedy": "0.98 is liquefaction in most tests"},
+    ),
+]
 
 
 @dataclass(frozen=True)
