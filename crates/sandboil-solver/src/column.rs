@@ -225,7 +225,7 @@ impl Column {
             for (&row, excess) in rows.iter().zip(excess) {
                 simulation.set_excess_at(row, excess);
             }
-            simulation.store_reaction();
+            simulation.store_load();
         }
         self.observe();
     }

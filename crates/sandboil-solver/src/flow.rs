@@ -296,6 +296,12 @@ impl Flow {
         self.cofactor[i].scaled(self.felt[i])
     }
 
+    /// Force on node `j` of the pressure that nodes tied to the surface have but do not push with, kN/m.
+    pub fn held_back(&self, tables: &FlowTables, j: usize) -> Vec2 {
+        let row = tables.divergence.transposed.iter_row(j);
+        row.map(|(i, weight)| self.cofactor[i].carry(*weight) * (self.neutral(i) - self.felt[i])).sum()
+    }
+
     /// Force of the water on node `j` beyond that at rest, kN/m: the exact transpose of the divergence, what stands on the
     /// ground surface against it, and the weight of water gained.
     #[inline]

@@ -479,6 +479,19 @@ impl Simulation {
         self.constant_force = self.static_force().iter().map(|force| -force).collect();
     }
 
+    /// Makes the excess pressure at the start of a stage one that a load holds, which stays. It bears on the nodes tied to
+    /// the surface, too: their pressure drains at once, what it carried does not go away.
+    pub(crate) fn store_load(&mut self) {
+        self.store_reaction();
+        let (Some(flow), Some(tables), None) = (&self.flow, &self.geometry.flow, &self.geometry.printed)
+        else {
+            return;
+        };
+        for (j, constant) in self.constant_force.iter_mut().enumerate() {
+            *constant -= flow.held_back(tables, j);
+        }
+    }
+
     /// Force of stress and pressure alone on every node, kN/m: without the velocity filter.
     fn static_force(&mut self) -> Vec<Vec2> {
         self.refresh_shares(&vec![Vec2::zeros(); self.velocity.len()]);
@@ -575,7 +588,7 @@ impl Simulation {
         if let Some(free_field) = &mut shaking.free_field {
             free_field.set_excess(&self.edges, flow.excess());
         }
-        self.store_reaction();
+        self.store_load();
         Ok(())
     }
 

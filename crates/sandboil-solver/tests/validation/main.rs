@@ -13,5 +13,6 @@ mod resume;
 mod seepage;
 mod shear_cell;
 mod stages;
+mod submerged;
 mod wave_column;
 mod waves;
