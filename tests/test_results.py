@@ -241,6 +241,10 @@ def test_the_summary_is_a_dict_and_a_page(finished: Run) -> None:
     assert shaking["largest r_u"]["depth 1 m"] == finished.history("r_u", depth=1.0).values.max()
     assert "surface" not in shaking["largest r_u"]
     assert shaking["counts"]["base_calls"] == shaking["steps"]
+    # Every stage has its own counts.
+    for stage in ("gravity", "shaking"):
+        assert summary[stage]["counts"]["steps"] == summary[stage]["steps"] > 0
+    assert summary["gravity"]["counts"]["base_calls"] == 0
     assert set(summary["pore pressure coefficient B"]) == {"loose", "dense"}
     text = str(summary)
     for told in ("status", "complete", "time step limited by", "wall time", "pressure_floors", "depth 3 m"):
