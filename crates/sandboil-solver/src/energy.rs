@@ -7,7 +7,7 @@
 
 use crate::{phases::Phases, soil_field::StressWork};
 
-/// Names of the columns of [`EnergyHistory`], in order; masses are Mg/m, all else is kJ/m.
+/// Names of the columns of a history of energy, in order; masses are Mg/m, all else is kJ/m.
 pub const ENERGY_NAMES: [&str; 11] = [
     "kinetic",
     "stress",
