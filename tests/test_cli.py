@@ -91,7 +91,7 @@ def test_plan_run_and_plot(scene_file: Path, tmp_path: Path) -> None:
     drawn = called("plot", out)
     assert (drawn.returncode, drawn.stderr) == (DONE, "")
     assert all(Path(line).is_file() for line in drawn.stdout.splitlines())
-    assert len(drawn.stdout.splitlines()) == 4
+    assert len(drawn.stdout.splitlines()) == 5
 
 
 def test_another_motion_shakes_the_scene(scene_file: Path, record: Path, tmp_path: Path) -> None:
