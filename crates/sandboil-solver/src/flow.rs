@@ -223,11 +223,7 @@ impl Flow {
         let mut table = match &mut self.edges {
             None => conduction.exchange(None, open_surface(conduction)),
             Some(edges) => {
-                let head = |node: usize| {
-                    model.position[node].y
-                        + (model.pore_pressure[node] + self.excess[node]) / self.unit_weight
-                };
-                edges.switch(time, &head);
+                let head = |node: usize| head(model, &self.excess, self.unit_weight, node);
                 edges.look_up(time);
                 let moisture = self.wetting.as_mut().map(Wetting::tabled);
                 let relative = moisture.as_ref().map(|all| all.each_ref().map(Vec::as_slice));

@@ -130,10 +130,7 @@ impl WaterEdges {
             is_still: false,
         };
         let head = edges.head_at_rest.clone();
-        let held = |(cell, demand): (&Cell, &Demand)| {
-            demand.inflow.is_infinite()
-                || (demand.head.is_finite() && head[cell.node as usize] >= demand.head)
-        };
+        let held = |(cell, demand): (&Cell, &Demand)| is_held(demand, cell, &|node| head[node]);
         edges.held_at_rest = edges.cells.cells.iter().zip(&edges.at_rest).map(held).collect();
         for (k, held) in edges.held_at_rest.iter_mut().enumerate() {
             *held &= edges.conditions[edges.cells.cells[k].boundary].at_rest.is_some();
@@ -248,7 +245,7 @@ impl WaterEdges {
             let open = match (cell, crossing) {
                 (Some(cell), _) => {
                     let cell = *cell as usize;
-                    let value = if state.is_rest { 0.0 } else { self.value[cell] / state.unit_weight };
+                    let value = if state.is_rest { 0.0 } else { self.value[cell] / self.unit_weight };
                     state.holds[cell].then(|| self.at_rest[cell].head + value)
                 }
                 // Ground without a condition is open where water stands in it.
@@ -301,23 +298,13 @@ impl WaterEdges {
         head: &dyn Fn(usize) -> f64,
     ) -> (Csr<f64>, Option<Vec<f64>>) {
         let unit_weight = self.unit_weight;
-        let state = State {
-            is_rest: false,
-            relative: moisture.map(|[now, _]| now),
-            holds: &self.holds,
-            head,
-            unit_weight,
-        };
+        let state =
+            State { is_rest: false, relative: moisture.map(|[now, _]| now), holds: &self.holds, head };
         let (table, mut inflow) = self.exchange(conduction, &state);
         let gained = moisture.map(|[_, then]| {
             let at_rest = |node: usize| self.head_at_rest[node];
-            let state = State {
-                is_rest: true,
-                relative: Some(then),
-                holds: &self.held_at_rest,
-                head: &at_rest,
-                unit_weight,
-            };
+            let state =
+                State { is_rest: true, relative: Some(then), holds: &self.held_at_rest, head: &at_rest };
             let (_, then) = self.exchange(conduction, &state);
             inflow.iter_mut().zip(then).for_each(|(now, then)| *now -= then);
             inflow
@@ -360,7 +347,6 @@ struct State<'a> {
     relative: Option<&'a [f64]>,
     holds: &'a [bool],
     head: &'a dyn Fn(usize) -> f64,
-    unit_weight: f64,
 }
 
 /// What a node sees beyond an edge.
