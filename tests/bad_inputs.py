@@ -182,7 +182,13 @@ def moving(conditions: list[dict[str, Any]], *changes: Change) -> Slip:
     return seeping(to("stages", [{"kind": "gravity"}, shaking]), *changes)
 
 
+def flowing(**given: object) -> Slip:
+    """The slope let go to flow, with more said of the stage."""
+    return slope(to(SHAKING, RUN_OUT | given))
+
+
 LEFT = {"kind": "head", "on": "left", "head": 4.0}
+RUN_OUT: dict[str, Any] = {"kind": "run-out", "duration": 1.0}
 WAVY = {"ratio": 0.005, "frequencies": [1.0, 10.0]}
 
 
@@ -567,6 +573,29 @@ CATALOGUE: dict[str, dict[str, Slip]] = {
             to("sides", {"kind": "free-field"}),
         ),
         "on no edge": moving([LEFT | {"on": "top"}]),
+    },
+    "ground that flows": {
+        "for no time": flowing(duration=0.0),
+        "for a time that is none": flowing(duration="long"),
+        "without a duration": slope(to(SHAKING, {"kind": "run-out"})),
+        "with a negative viscosity": flowing(viscosity=-0.1),
+        "with a viscosity that is none": flowing(viscosity=float("nan")),
+        "through water whose line turns back": flowing(still_water=[[0.0, 4.0], [2.0, 4.0], [1.0, 3.0]]),
+        "through water of numbers": flowing(still_water=[4.0, 5.0]),
+        "through water in dry ground": flowing(still_water=[[0.0, 4.0]]),
+        "over a side of an unknown name": flowing(open_sides=["top"]),
+        "over a periodic side": level(
+            to(SHAKING, {"kind": "run-out", "duration": 1.0, "open_sides": ["right"]})
+        ),
+        "before it is shaken": slope(
+            to("stages", [{"kind": "gravity"}, RUN_OUT, {"kind": "shaking", "duration": 5.0}])
+        ),
+        "twice": slope(to("stages", [{"kind": "gravity"}, RUN_OUT, RUN_OUT])),
+        "from no rest": slope(to("stages", [RUN_OUT])),
+        "with printed operators": slope(to(SHAKING, RUN_OUT), to("numerics", {"operators": "printed"})),
+        "with corrected inertia": slope(
+            to(SHAKING, RUN_OUT), to("numerics", {"dispersion_correction": True}), to("sides.kind", "roller")
+        ),
     },
     "base and sides": {
         "sides of an unknown kind": level(to("sides", {"kind": "periodc"})),

@@ -30,7 +30,7 @@ from .motion import Motion
 from .motion._motion import SIGNIFICANT
 from .motion._series import butterworth
 from .results import PGA_CORNER, PGA_ORDER, Run, interval_of
-from .scene import Shaking
+from .scene import Moving, RunOut
 
 FOLDER = "plots"
 
@@ -105,7 +105,7 @@ def plot(
     ----------
     folder : where to; default `plots` in the run's own
     reference : results of another code to lay over
-    stage : a shaking stage, default the last
+    stage : a stage in which the ground moves, default the last
 
     Raises
     ------
@@ -129,6 +129,8 @@ def plot(
 
 def _shaking_figures(run: Run, reference: Reference | None, stage: str) -> dict[str, Figure]:
     """Every picture of a shaking stage that the run has data for."""
+    if _is_run_out(run, stage):
+        return {"run_out": run_out(run, stage=stage), "energy": energy(run, stage=stage)}
     figures = {"surface": surface(run, reference=reference, stage=stage)}
     if run.scene.water is not None and run.scene.output.depths:
         figures["pore_pressure"] = pore_pressure(run, reference=reference, stage=stage)
@@ -142,11 +144,11 @@ def _shaking_figures(run: Run, reference: Reference | None, stage: str) -> dict[
 
 
 def _shaken_stages(run: Run) -> list[str]:
-    """Names of the shaking stages begun."""
+    """Names of the stages begun in which the ground moves."""
     return [
         name
         for name, kind in zip(run.scene.stage_names, run.scene.stages, strict=True)
-        if isinstance(kind, Shaking) and name in run.stages
+        if isinstance(kind, Moving) and name in run.stages
     ]
 
 
@@ -160,6 +162,43 @@ def _shaken_stage(run: Run, stage: str | None) -> str:
             "stage", stage, f"must be a shaking stage of the run: {', '.join(shaken) or 'none'}"
         )
     return stage
+
+
+def _is_run_out(run: Run, stage: str) -> bool:
+    return isinstance(run.scene.stages[run.scene.stage_names.index(stage)], RunOut)
+
+
+def run_out(run: Run, *, stage: str | None = None) -> Figure:
+    """Ground that flows: where it began, where it moved fastest, and where it came to."""
+    stage = _shaken_stage(run, stage)
+    history, times = run.energy(stage), run.frame_times(stage)
+    fastest = float(history["time"][np.argmax(history["kinetic"])])
+    outline, (x0, _, x1, _) = run.scene.outline, run.scene.bounds
+    edge = np.vstack([outline.base, outline.surface[::-1], outline.base[:1]])
+    moments = (float(times[0]), fastest, float(times[-1]))
+    moved = [run.position + run.field("displacement", time, stage=stage) for time in moments]
+    wet = run.scene.water is not None
+    name, label = ("pore_pressure", "pore pressure, kPa") if wet else ("velocity", "speed, m/s")
+    values = [run.field(name, time, stage=stage) for time in moments]
+    if not wet:
+        values = [np.hypot(velocity[:, 0], velocity[:, 1]) for velocity in values]
+    low, top = (extreme(value) for extreme, value in ((np.min, values), (np.max, values)))
+    # Grains that fly ahead of the front leave the picture rather than shrink it.
+    front = np.quantile(moved[-1][:, 0], (0.002, 0.998))
+    left, right = min(x0, float(front[0])), max(x1, float(front[1]))
+    bottom, height = outline.base[:, 1].min(), np.ptp(edge[:, 1])
+    panel = float(np.clip(10.0 * height / (right - left), 0.8, 4.0))
+    figure = Figure(figsize=(10.0, 3.0 * (panel + 0.6)), layout="constrained")
+    panels = figure.subplots(3, 1, sharex=True, sharey=True)
+    for axes, time, places, value in zip(panels, moments, moved, values, strict=True):
+        image = axes.scatter(*places.T, c=value, s=5.0, cmap="viridis", vmin=low, vmax=top, linewidths=0.0)
+        axes.plot(*edge.T, color="black", lw=0.8, label="at rest")
+        axes.set(ylabel="y, m", aspect="equal", xlim=(left, right), ylim=(bottom, bottom + 1.05 * height))
+        axes.set_title(f"{time:.4g} s", loc="left", fontsize=9)
+    panels[-1].set_xlabel("x, m")
+    figure.colorbar(image, ax=list(panels), label=label, shrink=0.8, pad=0.01)
+    panels[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=7)
+    return figure
 
 
 def seepage(run: Run) -> Figure:
@@ -354,13 +393,16 @@ def energy(run: Run, *, stage: str | None = None) -> Figure:
     history = run.energy(stage)
     figure = Figure(figsize=(8.0, 4.5), layout="constrained")
     axes = figure.subplots()
+    taken = "velocity filter and Rayleigh damping"
+    if _is_run_out(run, stage):
+        taken = "velocity filter, viscosity and edges"
     # Gravity's work and the stress at rest that carries it cancel, and would dwarf all else.
     parts = {
         "came in": history["base"] + history["sides"],
         "motion": history["kinetic"],
         "soil": history["stress"] - history["constant_forces"],
         "pore water": history["water"],
-        "velocity filter and Rayleigh damping": history["damping"],
+        taken: history["damping"],
         "local damping": history["local_damping"],
     }
     for (name, values), colour in zip(parts.items(), ("black", *_CONDITIONS), strict=True):

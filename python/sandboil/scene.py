@@ -614,7 +614,69 @@ class Shaking(Model):
         return self.model_copy(update=update)
 
 
-Stage = Annotated[Gravity | Shaking | Seepage, Field(discriminator="kind")]
+class RunOut(Model):
+    """Ground that flows, to where it comes to rest: large displacements under its own weight.
+
+    The base and the sides are held where they stand, as in statics, and the ground flows over them from the
+    state and the motion that the stage before has left. It is the last stage.
+
+    `open_sides` are taken away, as a gate is, and the base goes on beyond them. `viscosity` is Monaghan's
+    coefficient of the forces that brake particles which approach each other. `still_water` is the surface of
+    the water around the ground, (x, y) from left to right, level beyond its ends; left out, that of the state
+    at rest, ponds and water table; empty, there is none. Pore pressure beyond its hydrostatic pressure drains
+    through the free surface, wherever that comes to be. Soil above the water keeps the suction and the water
+    it has.
+    """
+
+    _label: ClassVar[str] = "stage"
+    _positional: ClassVar[tuple[str, ...]] = ("duration",)
+
+    kind: Literal["run-out"] = "run-out"
+    duration: Positive = Field(
+        description="s",
+        json_schema_extra={"remedy": "a heap falls for sqrt(2 height/gravity) s, and flows twice as long"},
+    )
+    open_sides: Annotated[Many[Literal["left", "right"]], Field(max_length=2)] = ()
+    viscosity: Number = Field(
+        default=0.1,
+        ge=0.0,
+        le=10.0,
+        description="1",
+        json_schema_extra={"remedy": "leave it out for 0.1"},
+    )
+    still_water: Annotated[Many[Point], Field(max_length=MAX_PARTS)] | None = Field(
+        default=None, description="(x, y), m; left out: as at rest"
+    )
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            duration: float,
+            *,
+            open_sides: Sequence[Literal["left", "right"]] = (),
+            viscosity: float = 0.1,
+            still_water: Sequence[tuple[float, float]] | None = None,
+        ) -> None: ...
+
+    @model_validator(mode="after")
+    def _line_runs_to_the_right(self) -> RunOut:
+        line = self.still_water or ()
+        for i, ((before, _), (x, _)) in enumerate(itertools.pairwise(line), start=1):
+            if not x > before:
+                raise InvalidInput(
+                    f"stage.still_water[{i}]",
+                    line[i],
+                    f"must lie to the right of the point before it, x > {before:g} m",
+                    "points run from left to right",
+                )
+        return self
+
+
+AnyStage = Gravity | Shaking | RunOut | Seepage
+# Stages in which the ground moves.
+Moving = Shaking | RunOut
+Stage = Annotated[AnyStage, Field(discriminator="kind")]
 
 
 class Output(Model):
@@ -1274,6 +1336,43 @@ class Scene(Model):
                     "must come before all shaking, and only once",
                     "leave it out",
                 )
+        for i, stage in enumerate(self.stages):
+            if isinstance(stage, RunOut):
+                self._check_run_out(stage, i)
+
+    def _check_run_out(self, stage: RunOut, i: int) -> None:
+        """Ground that has flowed is none to begin anew with, and its strains are not small."""
+        path = f"scene.stages[{i}]"
+        if i < len(self.stages) - 1:
+            raise InvalidInput(f"{path}.kind", stage.kind, "must be the last stage", "put it at the end")
+        if self.numerics.operators == "printed":
+            raise InvalidInput(
+                "scene.numerics.operators",
+                "printed",
+                "must be 'conservative' where the ground flows: the printed ones bear small strains alone",
+                "leave it out",
+            )
+        if self.numerics.dispersion_correction:
+            raise InvalidInput(
+                "scene.numerics.dispersion_correction",
+                True,
+                "must be left out where the ground flows: its contacts do not stay where they are",
+                "leave it out",
+            )
+        if stage.open_sides and isinstance(self.sides, Periodic):
+            raise InvalidInput(
+                f"{path}.open_sides",
+                stage.open_sides,
+                "does not go with periodic sides, which are none",
+                "sides = Roller()",
+            )
+        if stage.still_water and self.water is None:
+            raise InvalidInput(
+                f"{path}.still_water",
+                stage.still_water,
+                "goes with water, of which the scene has none",
+                "water = Water()",
+            )
 
     def _check_bases(self) -> None:
         shaken = [(i, stage) for i, stage in enumerate(self.stages) if isinstance(stage, Shaking)]
@@ -1375,7 +1474,7 @@ class Scene(Model):
     def _check_output(self) -> None:
         left, bottom, right, top = self.bounds
         for stage in self.stages:
-            duration = stage.duration if isinstance(stage, Shaking) else None
+            duration = stage.duration if isinstance(stage, Moving) else None
             if duration is not None and duration / self.output.field_dt > MAX_FRAMES:
                 raise InvalidInput(
                     "scene.output.field_dt",
@@ -1430,14 +1529,14 @@ class Scene(Model):
         x0, _, x1, _ = self.bounds
         return stage.base.arrivals(x0, x1)
 
-    def duration(self, stage: Gravity | Shaking | Seepage) -> float | None:
+    def duration(self, stage: AnyStage) -> float | None:
         """Duration of a stage in s: as given, or else until the last motion has passed, which is read.
 
         None for gravity, which ends at rest, and for seepage to its steady state.
         """
         if isinstance(stage, Gravity):
             return None
-        if isinstance(stage, Seepage) or stage.duration is not None:
+        if not isinstance(stage, Shaking) or stage.duration is not None:
             return stage.duration
         own = max(motion.load().duration if motion else 0.0 for motion in (stage.motion, stage.vertical))
         return max(
@@ -1514,6 +1613,8 @@ class Scene(Model):
         stateful = [region.name for region in self.regions if not isinstance(region.material, Elastic)]
         shakings = [stage for stage in self.stages if isinstance(stage, Shaking)]
         shaken = bool(shakings)
+        flowing = [stage for stage in self.stages if isinstance(stage, RunOut)]
+        moves = shaken or bool(flowing)
         damping = self.numerics.local_damping
         damped = [stage.rayleigh for stage in shakings if stage.rayleigh]
         dry, still = "the scene has no water", "no shaking stage"
@@ -1525,7 +1626,7 @@ class Scene(Model):
             lacking = [why for is_missing, why in missing if is_missing]
             return (name, not lacking, lacking[0] if lacking else reason)
 
-        no_flow = ((not wet, dry), (not shaken, still), (not permeable, "no region is permeable"))
+        no_flow = ((not wet, dry), (not moves, still), (not permeable, "no region is permeable"))
         term = self.numerics.acceleration_term
         compared = "no region exceeds" if self.uses_acceleration_term else "a region exceeds"
         chosen = f"{compared} {_core.ACCELERATION_TERM_CONDUCTIVITY:g} m/s"
@@ -1554,7 +1655,7 @@ class Scene(Model):
                 "soil state",
                 f"in {', '.join(stateful)}",
                 (not stateful, "every region is linearly elastic"),
-                (not shaken, still),
+                (not moves, still),
             ),
             active("base dashpots", "compliant base while shaking", (not shaken, still)),
             active(
@@ -1579,7 +1680,7 @@ class Scene(Model):
             active(
                 "local damping",
                 f"numerics.local_damping is {damping:g}",
-                (not shaken, still),
+                (not moves, still),
                 (damping == 0.0, "numerics.local_damping is 0"),
             ),
             active(
@@ -1593,6 +1694,11 @@ class Scene(Model):
                 "numerics.dispersion_correction is true",
                 (not shaken, still),
                 (not self.numerics.dispersion_correction, "numerics.dispersion_correction is false"),
+            ),
+            active(
+                "run-out",
+                f"large displacements, viscosity {flowing[0].viscosity:g}" if flowing else "",
+                (not flowing, "no run-out stage"),
             ),
             (
                 "velocity filter",
@@ -1738,6 +1844,6 @@ def _passage(base: CompliantBase) -> str:
     return f"{len(base.segments)} segments" if len(base.segments) > 1 else ""
 
 
-def _anchored(stage: Gravity | Shaking | Seepage, folder: Path) -> Gravity | Shaking | Seepage:
+def _anchored(stage: AnyStage, folder: Path) -> AnyStage:
     """The stage with its motions' files found from `folder`."""
     return stage.with_motions(lambda spec: spec.anchored(folder)) if isinstance(stage, Shaking) else stage

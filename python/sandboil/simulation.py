@@ -23,7 +23,7 @@ from .columns import load as load_columns
 from .discretise import Discretisation, Floats, discretise
 from .hydraulics import Drain, Seepage, series_of
 from .motion import Motion
-from .scene import Gravity, Region, Scene, Shaking
+from .scene import AnyStage, Gravity, Moving, Region, RunOut, Scene, Shaking
 
 # How long the core computes before it looks whether the user wants to stop, s.
 LOOK_INTERVAL = 0.1
@@ -226,9 +226,9 @@ class Simulation:
             )
         self.threads = threads
         self._stages = [
-            _shaking_description(scene, stage, duration, waves, self.probes)
-            if isinstance(stage, Shaking) and duration is not None and waves is not None
-            else None
+            None
+            if duration is None or not isinstance(stage, Moving)
+            else _moving_description(scene, stage, duration, waves, self.probes)
             for stage, duration, waves in zip(scene.stages, self._durations, self._waves, strict=True)
         ]
         self._water: _core.Seepage | None = None
@@ -248,7 +248,7 @@ class Simulation:
         return self.scene.stage_names[self._index]
 
     @property
-    def present_stage(self) -> Gravity | Shaking | Seepage:
+    def present_stage(self) -> AnyStage:
         """The present stage."""
         return self.scene.stages[self._index]
 
@@ -411,9 +411,9 @@ class Simulation:
         if isinstance(stage, Gravity):
             self._grains.begin_gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
             return
-        shaking = self._stages[self._index]
-        assert shaking is not None
-        self._grains.begin_shaking(shaking)
+        moving = self._stages[self._index]
+        assert moving is not None
+        self._grains.begin_shaking(moving)
 
     def _with_water_of_seepage(self) -> dict[str, Any]:
         """The section at rest with the water that its seepage stage has left."""
@@ -640,8 +640,9 @@ class Simulation:
     def counters(self) -> dict[str, int]:
         """Work done in the present stage, by kind: steps, calls, and every guard that acted.
 
-        `porosity_clips` counts porosities kept in the range of a packing, `pressure_floors` stresses held at
-        the soil's least pressure, `forced_acceptances` parts of a step taken at the smallest size although
+        `porosity_clips` counts porosities kept in the range of a packing, `edge_contacts` times that a
+        particle of flowing ground was stopped at base or side, `pressure_floors` stresses held at the
+        soil's least pressure, `forced_acceptances` parts of a step taken at the smallest size although
         their error was above the tolerance, `reversals` updates of a soil's reference stress, of which
         `near_neutral_reversals` might fall otherwise with other steps. Seepage has its own, `seepage_...`.
         """
@@ -839,18 +840,57 @@ def _side(kind: str, x: float, extent: tuple[float, float]) -> dict[str, Any] | 
     return {"x": x, "bottom": extent[0], "top": extent[1], "support": support}
 
 
-def _shaking_description(
+def _moving_description(
     scene: Scene,
-    stage: Shaking,
+    stage: Moving,
     duration: float,
-    waves: tuple[list[Wave], list[int | None]],
+    waves: tuple[list[Wave], list[int | None]] | None,
     probes: list[Probe],
 ) -> dict[str, Any]:
-    """A shaking stage as the numerical core takes it."""
-    base, rayleigh, output = stage.base, stage.rayleigh, scene.output
-    left, right = ("free-field" if kind == "free-field" else "wall" for kind in scene.side_kinds)
+    """A stage in which the ground moves as the numerical core takes it."""
+    output = scene.output
     return {
         "duration": duration,
+        **(_run_out(scene, stage) if isinstance(stage, RunOut) else _shaking(scene, stage, waves)),
+        "column_records": (None, None),
+        "record_columns": None,
+        "local_damping": scene.numerics.local_damping,
+        "time_step_factor": scene.numerics.time_step_factor,
+        "probes": np.array([(probe.x, probe.y) for probe in probes]),
+        "history_interval": output.history_dt,
+        "stress_histories": output.stress_paths,
+        "pressure_envelope": "r_u" in output.envelopes,
+        "strain_envelope": "gamma_max" in output.envelopes,
+    }
+
+
+def _run_out(scene: Scene, stage: RunOut) -> dict[str, Any]:
+    """What ground that flows is held by and stands in: base and sides are walls, and no wave comes."""
+    x0, _, x1, _ = scene.bounds
+    return {
+        "waves": [],
+        "base": {"vertical": "roller", "half_space": None, "segments": [(x0, x1, None, 0.0, 0.0)]},
+        "sides": ("wall", "wall"),
+        "conditions": [],
+        "rayleigh": None,
+        "run_out": {
+            "viscosity": stage.viscosity,
+            "open": tuple(hand in stage.open_sides for hand in ("left", "right")),
+            "still_water": None
+            if stage.still_water is None
+            else np.array(stage.still_water, dtype=np.float64).reshape(-1, 2),
+        },
+    }
+
+
+def _shaking(
+    scene: Scene, stage: Shaking, waves: tuple[list[Wave], list[int | None]] | None
+) -> dict[str, Any]:
+    """What shakes the ground, and holds it beside."""
+    assert waves is not None
+    base, rayleigh = stage.base, stage.rayleigh
+    left, right = ("free-field" if kind == "free-field" else "wall" for kind in scene.side_kinds)
+    return {
         "waves": waves[0],
         "base": {
             "vertical": stage.base_vertical,
@@ -861,22 +901,14 @@ def _shaking_description(
             ],
         },
         "sides": (left, right),
-        "column_records": (None, None),
-        "record_columns": None,
         "conditions": [
             _condition(scene, condition) | {"at_rest": at_rest}
             for condition, at_rest in scene.moving_conditions(stage)
         ]
         if scene.water is not None
         else [],
-        "local_damping": scene.numerics.local_damping,
         "rayleigh": None if rayleigh is None else (rayleigh.ratio, rayleigh.frequencies),
-        "time_step_factor": scene.numerics.time_step_factor,
-        "probes": np.array([(probe.x, probe.y) for probe in probes]),
-        "history_interval": output.history_dt,
-        "stress_histories": output.stress_paths,
-        "pressure_envelope": "r_u" in output.envelopes,
-        "strain_envelope": "gamma_max" in output.envelopes,
+        "run_out": None,
     }
 
 

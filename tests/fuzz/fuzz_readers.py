@@ -45,8 +45,8 @@ from sandboil._hdf5 import LAYOUT
 from sandboil.materials import material
 from sandboil.simulation import Simulation
 
-# Longest that reading one input may take, s, and how long the parent waits before it ends a process that does
-# not even answer signals.
+# Longest that reading one input may take of the processor's time, s, whatever else the machine does, and how
+# long the parent waits before it ends a process that makes no progress.
 LIMIT = 10.0
 PATIENCE = 60.0
 # Memory that reading may take beyond what the process has at first, bytes.
@@ -514,15 +514,15 @@ NUMBER, READ, FAULTS = range(3)
 
 def _work(reader: Reader, seed: int, inputs: range, shared: Any, keep: Path, path: Path) -> None:
     """Read inputs one after the other, telling which, and count what came of them."""
-    signal.signal(signal.SIGALRM, _hang)
+    signal.signal(signal.SIGPROF, _hang)
     warnings.simplefilter("ignore")
     _limit_memory()
     for number in inputs:
         shared[NUMBER] = number
         content = spoilt(reader, seed, number)
-        signal.setitimer(signal.ITIMER_REAL, LIMIT)
+        signal.setitimer(signal.ITIMER_PROF, LIMIT)
         told = outcome(reader, content, path)
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
         if told == "read":
             shared[READ] += 1
         elif told != "refused":

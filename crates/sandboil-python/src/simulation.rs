@@ -171,6 +171,15 @@ fn base(stage: &Bound<'_, PyDict>) -> PyResult<solver::Base> {
     })
 }
 
+fn run_out(dict: &Bound<'_, PyDict>) -> PyResult<solver::RunOut> {
+    let line: Option<PyReadonlyArray2<f64>> = get(dict, "still_water")?;
+    Ok(solver::RunOut {
+        viscosity: get(dict, "viscosity")?,
+        open: get(dict, "open")?,
+        still_water: line.as_ref().map(vectors),
+    })
+}
+
 pub fn model(dict: &Bound<'_, PyDict>) -> PyResult<solver::Model> {
     let numerics_dict: Bound<'_, PyDict> = get(dict, "numerics")?;
     let gap_memory = get(&numerics_dict, "gap_memory")?;
@@ -309,7 +318,9 @@ impl Simulation {
         let [left, right] = get::<[String; 2]>(stage, "sides")?;
         let is_free = |side: &str| one_of("sides", side, &[("free-field", true), ("wall", false)]);
         let rayleigh: Option<(f64, [f64; 2])> = get(stage, "rayleigh")?;
+        let flowing: Option<Bound<'_, PyDict>> = get(stage, "run_out")?;
         let stage = solver::Shaking {
+            run_out: flowing.as_ref().map(run_out).transpose()?,
             duration: get(stage, "duration")?,
             base: base(stage)?,
             free_field: [is_free(&left)?, is_free(&right)?],
@@ -511,6 +522,7 @@ pub fn counted<'py>(py: Python<'py>, counters: &solver::Counters) -> PyResult<Bo
         ("geometry_builds", counters.geometry_builds),
         ("porosity_clips", counters.porosity_clips),
         ("time_step_changes", counters.time_step_changes),
+        ("edge_contacts", counters.edge_contacts),
         ("substeps", counters.soil.substeps),
         ("evaluations", counters.soil.evaluations),
         ("pressure_floors", counters.soil.pressure_floors),

@@ -70,10 +70,21 @@ struct Along {
 pub type Rows = Vec<Vec<(u32, f64)>>;
 
 impl Conduction {
-    /// Tables of a geometry: stencils of the nodes at `points`, gradients at their stress nodes.
-    pub fn new(model: &Model, stencils: &Stencils, gradient: &Csr<GradientWeight>, points: &[Vec2]) -> Self {
+    /// Tables of a geometry: stencils of the nodes at `points`, gradients at their stress nodes. With `has_profile` the
+    /// ground surface is an edge, that of the columns of the lattice.
+    pub fn new(
+        model: &Model,
+        stencils: &Stencils,
+        gradient: &Csr<GradientWeight>,
+        points: &[Vec2],
+        has_profile: bool,
+    ) -> Self {
         let support = stencils.kernel.support();
-        let around = with_surface(model, stencils.around, points, support);
+        let around = if has_profile {
+            with_surface(model, stencils.around, points, support)
+        } else {
+            stencils.around.clone()
+        };
         let list = NeighbourList::build(points, &around.sources, support, 0.0, model.period);
         let edge_images = stencils.around.images.len();
         let stencils = Stencils { around: &around, ..*stencils };
@@ -230,6 +241,28 @@ impl Conduction {
                 row.extend(derivative.forward.iter_row(s).map(|(k, w)| (id(k), scale * w)));
             }
         }
+    }
+
+    /// The exchange of soil that loses water through a free surface alone: `leaks` per metre of head of each node, m/s.
+    /// Nothing passes the nodes that are `shut`.
+    pub fn leaking(&self, leaks: &[f64], shut: impl Fn(usize) -> bool) -> Csr<f64> {
+        let open = |i: usize, j: usize| if shut(i) || shut(j) { 0.0 } else { 1.0 };
+        let mut rows = self.pair_rows(open);
+        let along = |s: usize| {
+            let mut seen = self.along.iter().flat_map(|along| along.derivative.forward.iter_row(s));
+            if seen.any(|(node, _)| shut(node)) { 0.0 } else { 1.0 }
+        };
+        self.add_along(along, &mut rows);
+        for pair in &self.beyond {
+            let strength = pair.closed * open(pair.node as usize, pair.owner as usize);
+            let row = &mut rows[pair.node as usize];
+            row.push((pair.owner, strength));
+            row.push((pair.node, -strength));
+        }
+        for (node, leak) in leaks.iter().enumerate() {
+            rows[node].push((id(node), -leak * open(node, node)));
+        }
+        collected(rows)
     }
 
     /// The whole exchange of soil with the relative conductivities of its nodes, m/s; none: saturated. `across` tells what

@@ -14,6 +14,7 @@ use crate::{
     parallel::{Rows, chunks, for_each_chunk},
     phases::Phases,
     skeleton::StressPoint,
+    still_water::StillWater,
     water_edges::{MovingBoundary, WaterEdges, open_surface},
     wetting::Wetting,
 };
@@ -42,11 +43,14 @@ pub struct Ground<'a> {
     pub position: &'a [Vec2],
     /// The edges, and what they are.
     pub edges: (&'a Outline, Walls),
+    /// Outward normals of the nodes at a free surface, if the ground flows: its columns are none of the lattice's then.
+    pub free_surface: Option<&'a [Option<Vec2>]>,
 }
 
 impl Ground<'_> {
     fn conduction(&self) -> Conduction {
-        conduction(self.model, self.geometry, self.position, self.phases.volume(), self.edges)
+        let has_profile = self.free_surface.is_none();
+        conduction(self.model, self.geometry, self.position, self.phases.volume(), self.edges, has_profile)
     }
 
     fn drains(&self) -> bool {
@@ -76,6 +80,7 @@ pub struct Flow {
     inverse_volume: Vec<f64>,
     edges: Option<WaterEdges>,
     wetting: Option<Wetting>,
+    still: Option<Still>,
     scheme: Scheme,
     right_hand_side: Vec<f64>,
 }
@@ -92,6 +97,18 @@ enum Scheme {
         #[serde(skip)]
         factors: Option<(f64, BandedLu)>,
     },
+}
+
+/// Still water that the ground flows through: excess counts from it.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+struct Still {
+    water: StillWater,
+    /// Its pressure where the nodes are, kPa.
+    pressure: Vec<f64>,
+    /// Nodes whose pores hold air: their suction goes with them, and no water passes.
+    holds_air: Vec<bool>,
+    /// What the pressure in a node exceeds that of the still water by when its excess since rest is zero, kPa.
+    at_rest: Vec<f64>,
 }
 
 /// What the caller chose for a stage.
@@ -120,20 +137,24 @@ impl Flow {
         let Ground { model, phases, .. } = ground;
         let Some(water) = model.water else { return Ok(None) };
         let conductivity = |node: usize| model.regions[model.region[node] as usize].hydraulic_conductivity;
-        let wetting = Wetting::new(model, phases, !conditions.is_empty());
+        let is_flowing = ground.free_surface.is_some();
+        // Ground that flows keeps the water it has above the water table.
+        let wetting = if is_flowing { None } else { Wetting::new(model, phases, !conditions.is_empty()) };
         let drained = scheme != FlowScheme::Undrained;
         let edges = if drained && (wetting.is_some() || !conditions.is_empty()) {
             // Conditions lie on the edges as they were drawn.
             let drawn = (&model.outline, ground.edges.1);
-            let tables = conduction(model, ground.geometry, &model.position, &model.volume, drawn);
+            let tables = conduction(model, ground.geometry, &model.position, &model.volume, drawn, true);
             Some(WaterEdges::new(model, water, &tables, conditions)?)
         } else {
             None
         };
         let drains = |tie: &SurfaceNode| conductivity(tie.node as usize).major > 0.0;
         let is_sealed = |tie: &SurfaceNode| edges.as_ref().is_some_and(|edges| edges.seals(tie.node));
+        // Nothing ties the surface of ground that flows but what crosses it.
+        let ties = if is_flowing { Vec::new() } else { surface_nodes(model, water) };
         let surface: Vec<SurfaceNode> =
-            surface_nodes(model, water).into_iter().filter(|tie| drains(tie) && !is_sealed(tie)).collect();
+            ties.into_iter().filter(|tie| drains(tie) && !is_sealed(tie)).collect();
         // Only the acceleration term reads them.
         let mobility = if scheme == FlowScheme::ExplicitWithAcceleration {
             (0..model.nodes()).map(|node| conductivity(node).tensor() / model.gravity).collect()
@@ -157,6 +178,7 @@ impl Flow {
             inverse_volume: Vec::new(),
             edges,
             wetting,
+            still: None,
             scheme: match scheme {
                 FlowScheme::Undrained => Scheme::Undrained,
                 FlowScheme::Explicit => Scheme::Explicit { acceleration_term: false },
@@ -173,7 +195,8 @@ impl Flow {
     pub fn follow(&mut self, ground: Ground, time: f64) {
         let Ground { model, phases, position, .. } = ground;
         for (node, stiffness) in self.stiffness.iter_mut().enumerate() {
-            *stiffness = self::stiffness(model, phases, node);
+            let holds_air = self.still.as_ref().is_some_and(|still| still.holds_air[node]);
+            *stiffness = if holds_air { 0.0 } else { self::stiffness(model, phases, node) };
         }
         self.cofactor.fill(Deformation::default().cofactor());
         self.inverse_volume = phases.volume().iter().map(|volume| volume.recip()).collect();
@@ -190,10 +213,45 @@ impl Flow {
             edges.follow(&conduction, displacement);
         }
         self.switch(model, time);
-        self.tabulate(model, &conduction, time);
+        self.tabulate(model, &conduction, ground.free_surface, time);
         if let Some(wetting) = &mut self.wetting {
             wetting.conduction = Some(conduction);
         }
+    }
+
+    /// Puts ground that flows into still water, from which its excess counts from now on. Its pores have the `neutral`
+    /// stress `S_r p` and an excess since rest (kPa), and hold air or not.
+    pub fn stand_in(
+        &mut self,
+        water: StillWater,
+        ground: Ground,
+        (neutral, excess): (Vec<f64>, &[f64]),
+        holds_air: Vec<bool>,
+    ) {
+        let at_rest = neutral.iter().zip(excess).map(|(neutral, excess)| neutral - excess).collect();
+        self.excess = neutral;
+        self.still = Some(Still { water, pressure: vec![0.0; holds_air.len()], holds_air, at_rest });
+        self.carry(ground.position);
+        self.follow(ground, 0.0);
+    }
+
+    /// Counts the excess from the still water where the nodes have come to.
+    pub fn carry(&mut self, position: &[Vec2]) {
+        let Some(Still { water, pressure, holds_air, .. }) = &mut self.still else { return };
+        for (node, (excess, rest)) in self.excess.iter_mut().zip(pressure).enumerate() {
+            if !holds_air[node] {
+                let here = water.pressure(position[node]);
+                *excess += *rest - here;
+                *rest = here;
+            }
+        }
+        self.feel();
+    }
+
+    /// Force of the still water on every node, kN/m.
+    pub fn buoyancy(&self, position: &[Vec2], volume: &[f64]) -> Option<Vec<Vec2>> {
+        let Still { water, .. } = self.still.as_ref()?;
+        Some(position.iter().zip(volume).map(|(at, volume)| water.gradient(*at) * -volume).collect())
     }
 
     /// Makes the tables of diffusion anew where conductivities or conditions have left them. Full soil keeps both.
@@ -202,7 +260,7 @@ impl Flow {
         let Some(conduction) = wetting.conduction.take() else { return };
         let is_stale = wetting.is_stale();
         if self.switch(model, time) || is_stale {
-            self.tabulate(model, &conduction, time);
+            self.tabulate(model, &conduction, None, time);
         }
         if let Some(wetting) = &mut self.wetting {
             wetting.conduction = Some(conduction);
@@ -216,13 +274,23 @@ impl Flow {
     }
 
     /// The table of diffusion for the present conditions and conductivities.
-    fn tabulate(&mut self, model: &Model, conduction: &Conduction, time: f64) {
+    fn tabulate(
+        &mut self,
+        model: &Model,
+        conduction: &Conduction,
+        free_surface: Option<&[Option<Vec2>]>,
+        time: f64,
+    ) {
         if let Scheme::Implicit { factors } = &mut self.scheme {
             *factors = None;
         }
-        let mut table = match &mut self.edges {
-            None => conduction.exchange(None, open_surface(conduction)),
-            Some(edges) => {
+        let mut table = match (&mut self.edges, free_surface) {
+            (None, Some(normals)) => {
+                let holds_air = self.still.as_ref().map_or(&[][..], |still| &still.holds_air);
+                conduction.leaking(&leaks(model, normals), |node| holds_air.get(node) == Some(&true))
+            }
+            (None, None) => conduction.exchange(None, open_surface(conduction)),
+            (Some(edges), _) => {
                 let head = |node: usize| head(model, &self.excess, self.unit_weight, node);
                 edges.look_up(time);
                 let moisture = self.wetting.as_mut().map(Wetting::tabled);
@@ -238,8 +306,15 @@ impl Flow {
         self.diffusion = Some(table);
     }
 
-    /// Excess pore pressure at velocity nodes, kPa, compression positive.
-    pub fn excess(&self) -> &[f64] {
+    /// Excess pore pressure since rest of a node, kPa, compression positive.
+    #[inline]
+    pub fn excess(&self, node: usize) -> f64 {
+        let own = self.excess[node];
+        self.still.as_ref().map_or(own, |still| own + still.pressure[node] - still.at_rest[node])
+    }
+
+    /// Excess pore pressures from which the flow counts, kPa.
+    pub fn own_excess(&self) -> &[f64] {
         &self.excess
     }
 
@@ -284,6 +359,9 @@ impl Flow {
             + self.diffusion.as_ref().map_or(0, Csr::bytes)
             + self.edges.as_ref().map_or(0, WaterEdges::bytes)
             + self.wetting.as_ref().map_or(0, Wetting::bytes)
+            + self.still.as_ref().map_or(0, |still| {
+                still.water.bytes() + 2 * size_of_val(still.pressure.as_slice()) + still.holds_air.len()
+            })
             + factors
     }
 
@@ -476,6 +554,16 @@ fn head(model: &Model, excess: &[f64], unit_weight: f64, node: usize) -> f64 {
     model.position[node].y + (model.pore_pressure[node] + excess[node]) / unit_weight
 }
 
+/// What leaves the nodes at a free surface per metre of head in them, m/s: half a spacing from the water outside, each
+/// through a spacing of the surface.
+fn leaks(model: &Model, free_surface: &[Option<Vec2>]) -> Vec<f64> {
+    let open = |(region, normal): (&u32, &Option<Vec2>)| {
+        let conductivity = model.regions[*region as usize].hydraulic_conductivity;
+        normal.map_or(0.0, |normal| 2.0 * normal.dot(&(conductivity.tensor() * normal)))
+    };
+    model.region.iter().zip(free_surface).map(open).collect()
+}
+
 /// Pressure rise of a node per unit of volume strain, kPa. Above the water table air gives way.
 fn stiffness(model: &Model, phases: &Phases, node: usize) -> f64 {
     if model.saturation(node) < 1.0 { 0.0 } else { model.water_stiffness(phases.porosity(node)) }
@@ -567,7 +655,14 @@ mod tests {
         let walls = Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]);
         let edges = (&model.outline, walls);
         let geometry = Geometry::build(model, &model.position, &model.volume, edges, None);
-        let ground = Ground { model, phases: &phases, geometry: &geometry, position: &model.position, edges };
+        let ground = Ground {
+            model,
+            phases: &phases,
+            geometry: &geometry,
+            position: &model.position,
+            edges,
+            free_surface: None,
+        };
         let flow = Flow::new(ground, scheme, &[]).unwrap().unwrap();
         (flow, geometry)
     }
@@ -619,8 +714,14 @@ mod tests {
         phases.follow(&vec![strained; STRESS_NODES * model.nodes()]);
         let walls = Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]);
         let edges = (&model.outline, walls);
-        let ground =
-            Ground { model: &model, phases: &phases, geometry: &geometry, position: &model.position, edges };
+        let ground = Ground {
+            model: &model,
+            phases: &phases,
+            geometry: &geometry,
+            position: &model.position,
+            edges,
+            free_surface: None,
+        };
         flow.follow(ground, 0.0);
         let porosity = 1.0 - 0.5 * 0.1_f64.exp();
         assert!((flow.stiffness[4] - 8.0 / porosity).abs() < 1e-12);

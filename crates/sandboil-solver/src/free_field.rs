@@ -153,6 +153,7 @@ impl FreeField {
             let Some(side) = section.outline.sides[hand as usize] else { continue };
             if !std::mem::replace(&mut begun[column], true) {
                 let of_column = Shaking {
+                    run_out: None,
                     base: Base {
                         segments: vec![stage.base.at(side.x)],
                         datum: Some(stage.base.datum.unwrap_or_else(|| section.model.outline.lowest())),

@@ -154,6 +154,11 @@ struct Lists {
     from_velocity: NeighbourList,
 }
 
+/// Whether a node has moved further than lists with a skin bear, m.
+fn has_left((now, then): (&Vec2, &Vec2), skin: f64) -> bool {
+    (now - then).norm() > 0.5 * skin
+}
+
 /// Positions of all stress nodes of the given velocity nodes (offsets do not rotate), m.
 pub fn stress_node_positions(position: &[Vec2], spacing: Vec2) -> Vec<Vec2> {
     let offset = stress_node_offset(spacing);
@@ -206,8 +211,7 @@ impl Geometry {
         let list = previous
             .map(|geometry| geometry.list)
             .filter(|list| {
-                let moved = |(now, then): (&Vec2, &Vec2)| (now - then).norm() > 0.5 * skin;
-                !position.iter().zip(&list.reference).any(moved)
+                !position.iter().zip(&list.reference).any(|pair| has_left(pair, skin))
                     && list.from_stress.queries() == stress_position.len()
             })
             .filter(|list| list.owners.iter().copied().eq(around.owners()))
@@ -265,6 +269,46 @@ impl Geometry {
     /// Adds to the gradients at some stress nodes, and to the force that is their transpose.
     pub fn enhance(&mut self, more: BTreeMap<usize, Vec<(u32, VectorWeight)>>, nodes: usize) {
         self.wall = Paired::new(self.wall.forward.with_more(more), nodes);
+    }
+
+    /// Whether some node has left the skin of the lists.
+    pub fn is_left(&self, model: &Model, position: &[Vec2]) -> bool {
+        let skin = SKIN * model.mean_spacing();
+        position.iter().zip(&self.list.reference).any(|pair| has_left(pair, skin))
+    }
+
+    /// Nodes listed near node `i`, itself among them, and how many periods to the right each stands; without images.
+    pub fn nodes_near(&self, i: usize) -> impl Iterator<Item = (usize, f64)> {
+        let nodes = self.list.reference.len();
+        let near = self.list.from_velocity.of(i).iter();
+        near.map(|pair| (pair.source as usize, f64::from(pair.wraps))).filter(move |(j, _)| *j < nodes)
+    }
+
+    /// Bounds of the largest squared wave numbers that strain and divergence see, 1/m2 (Gershgorin): how sharp the weights
+    /// are. `volume` of the nodes, m2.
+    pub fn sharpness(&self, volume: &[f64]) -> [f64; 2] {
+        let half = |s: usize| volume[s / STRESS_NODES] / STRESS_NODES as f64;
+        let strain = |s: usize| -> f64 {
+            let free = self.gradient.forward.iter_row(s).map(|(_, weight)| weight.gradient.norm());
+            free.sum::<f64>() + self.wall.forward.iter_row(s).map(|(_, w)| w.magnitude()).sum::<f64>()
+        };
+        let of_points: Vec<f64> = (0..self.gradient.forward.rows()).map(|s| half(s) * strain(s)).collect();
+        let of_node = |j: usize| -> f64 {
+            let free = self.gradient.transposed.iter_row(j).map(|(s, w)| w.gradient.norm() * of_points[s]);
+            let walls = self.wall.transposed.iter_row(j).map(|(s, w)| w.magnitude() * of_points[s]);
+            (free.sum::<f64>() + walls.sum::<f64>()) / volume[j]
+        };
+        let skeleton = (0..volume.len()).map(of_node).fold(0.0, f64::max);
+        let water = self.flow.as_ref().map_or(0.0, |flow| {
+            let reach: Vec<f64> = (0..volume.len())
+                .map(|i| flow.divergence.forward.iter_row(i).map(|(_, w)| w.norm()).sum())
+                .collect();
+            // The transposed weights carry the volumes of their rows.
+            let row = |j| flow.divergence.transposed.iter_row(j);
+            let of_node = |j: usize| row(j).map(|(i, w)| w.norm() * reach[i]).sum::<f64>() / volume[j];
+            (0..volume.len()).map(of_node).fold(0.0, f64::max)
+        });
+        [skeleton, water]
     }
 
     /// Pairs between stress and velocity nodes, images folded.
@@ -397,21 +441,23 @@ pub fn static_conduction(model: &Model) -> Conduction {
     let points = if directed { stress_node_positions(position, model.spacing) } else { Vec::new() };
     let list = NeighbourList::build(&points, &around.sources, kernel.support(), 0.0, model.period);
     let (gradient, _, _) = least_squares_tables(&stencils, &list, &points);
-    Conduction::new(model, &stencils, &gradient, position)
+    Conduction::new(model, &stencils, &gradient, position, true)
 }
 
 /// Exchange of water in a section that has moved to `position`, with nodes of `volume` (m2); `geometry` is that of the place.
+/// With `has_profile` the ground surface is that of the columns of the lattice.
 pub fn conduction(
     model: &Model,
     geometry: &Geometry,
     position: &[Vec2],
     volume: &[f64],
     (outline, walls): (&Outline, Walls),
+    has_profile: bool,
 ) -> Conduction {
     let kernel = WendlandQuintic::new(model.smoothing_length());
     let around = Surroundings::new(position, outline, walls, kernel.support());
     let stencils = Stencils { around: &around, volume, kernel, period: model.period };
-    Conduction::new(model, &stencils, &geometry.gradient.forward, position)
+    Conduction::new(model, &stencils, &geometry.gradient.forward, position, has_profile)
 }
 
 /// Divergence at velocity nodes (Eq. 7), images folded.

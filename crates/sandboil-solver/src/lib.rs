@@ -18,6 +18,7 @@ mod energy;
 pub mod error;
 mod flow;
 mod free_field;
+mod free_surface;
 mod geometry;
 pub mod hydraulics;
 pub mod model;
@@ -25,6 +26,7 @@ mod parallel;
 mod phases;
 mod rayleigh;
 mod record;
+mod run_out;
 pub mod seepage;
 pub mod shear_cell;
 pub mod simulation;
@@ -33,6 +35,7 @@ mod soil_field;
 #[cfg(test)]
 mod spectrum_tests;
 pub mod state;
+mod still_water;
 mod timestep;
 mod water_edges;
 mod wetting;
@@ -47,6 +50,7 @@ pub use model::{
     AccelerationTerm, Conductivity, Diffusion, Model, Numerics, Operators, Region, Water, stress_node_offset,
 };
 pub use rayleigh::Rayleigh;
+pub use run_out::RunOut;
 pub use sandboil_sph::{Period, Vec2};
 pub use seepage::{Seepage, SeepageCounters, Until, WaterBalance};
 pub use shear_cell::{CellTest, Departure, ShearCell};

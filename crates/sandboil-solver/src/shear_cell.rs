@@ -381,7 +381,15 @@ impl ShearCell {
     fn limit(&self) -> f64 {
         let stiffest = self.points.iter().map(|point| point.stiffness).fold(0.0, f64::max);
         SHAKING_FACTOR
-            * region_limit(&self.model, 0, stiffest, PressureCoupling::None, &self.spectrum, None, false).0
+            * region_limit(
+                (&self.model, 0),
+                stiffest,
+                PressureCoupling::None,
+                &self.spectrum,
+                None,
+                (false, None),
+            )
+            .0
     }
 
     /// Advances by at most `steps` steps; returns whether the test has reached its end.

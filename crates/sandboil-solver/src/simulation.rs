@@ -12,18 +12,21 @@ use crate::{
     error::SolverError,
     flow::{Flow, FlowScheme, Ground},
     free_field::{FreeField, Section},
+    free_surface::free_surface,
     geometry::{Geometry, consistent_gradient, point_weights, stress_node_positions, stress_node_values},
     model::{AccelerationTerm, Diffusion, Model, Operators, STRESS_NODES},
     parallel::{Pool, Rows, chunks, for_each_chunk},
     phases::Phases,
     rayleigh::{Rayleigh, RayleighDamping},
     record::{Probes, Recorder},
+    run_out::{Flowing, RunOut, Viscosity, stick_to_edges},
     skeleton::{
         NodalShare, PrintedStress, StressPoint, conservative_force, local_damping, maximum_shear_strain,
         motion,
     },
     soil_field::{SoilField, StressWork},
     state::{self, StateError},
+    still_water::StillWater,
     timestep::{Criterion, PressureCoupling, PressureSpectrum, region_limit},
     water_edges::MovingBoundary,
 };
@@ -78,6 +81,8 @@ pub struct Shaking {
     pub rayleigh: Option<Rayleigh>,
     /// Hydraulic conditions. Without one the ground surface keeps its pressure, and all other edges are impermeable.
     pub conditions: Vec<MovingBoundary>,
+    /// Whether the ground is let go to flow: on the base and between the walls of statics, under its own weight.
+    pub run_out: Option<RunOut>,
     /// Factor on the stability limit.
     pub time_step_factor: f64,
     /// Points where histories are read, m.
@@ -113,6 +118,8 @@ pub struct Counters {
     pub porosity_clips: u64,
     /// Changes of the time step.
     pub time_step_changes: u64,
+    /// Times that a node of flowing ground was stopped at an edge.
+    pub edge_contacts: u64,
     /// What the soil models counted.
     pub soil: UpdateReport,
 }
@@ -187,6 +194,7 @@ pub struct Simulation {
     flow: Option<Flow>,
     printed_stress: Option<PrintedStress>,
     rayleigh: Option<RayleighDamping>,
+    flowing: Option<Flowing>,
     dispersion: Option<Dispersion>,
     contacts: Option<Contacts>,
     active: Active,
@@ -246,6 +254,7 @@ impl Simulation {
             printed_stress: geometry.printed.as_ref().map(|_| PrintedStress::default()),
             geometry,
             rayleigh: None,
+            flowing: None,
             dispersion: None,
             contacts: None,
             active: Active::None,
@@ -299,10 +308,26 @@ impl Simulation {
         self.set_walls(Walls::statics(&self.model.outline));
         self.soil = SoilField::elastic(&self.model, &mut self.points)?;
         self.flow = None;
-        self.rayleigh = None;
+        (self.rayleigh, self.flowing) = (None, None);
+        self.weigh();
+        let factor = if self.geometry.is_balanced { balance::RESPONSE } else { 1.0 };
+        (self.dt, self.criterion) = self.limit(PressureCoupling::None, factor * RELAXATION_FACTOR);
+        self.begin(Active::Gravity { stage, kinetic_energy: 0.0, residual: f64::INFINITY, at_rest: false });
+        self.set_guests(0);
+        self.velocity.fill(Vec2::zeros());
+        self.refresh_shares(&vec![Vec2::zeros(); self.model.nodes()]);
+        Ok(())
+    }
+
+    /// Constant forces of weight and of the pressure at rest.
+    fn weigh(&mut self) {
         let gravity = Vec2::new(0.0, -self.model.gravity);
         self.constant_force = self.mass.iter().map(|mass| gravity * *mass).collect();
-        if self.model.water.is_some() {
+        if let Some(buoyancy) =
+            self.flow.as_ref().and_then(|flow| flow.buoyancy(&self.position, self.phases.volume()))
+        {
+            self.constant_force.iter_mut().zip(buoyancy).for_each(|(force, buoyancy)| *force += buoyancy);
+        } else if self.model.water.is_some() {
             let (suction, pressure): (Vec<f64>, Vec<f64>) =
                 self.model.neutral_stress().into_iter().map(|p| (p.min(0.0), p.max(0.0))).unzip();
             if suction.iter().any(|p| *p < 0.0) {
@@ -315,13 +340,6 @@ impl Simulation {
                 *force -= gradient * *volume;
             }
         }
-        let factor = if self.geometry.is_balanced { balance::RESPONSE } else { 1.0 };
-        (self.dt, self.criterion) = self.limit(PressureCoupling::None, factor * RELAXATION_FACTOR);
-        self.begin(Active::Gravity { stage, kinetic_energy: 0.0, residual: f64::INFINITY, at_rest: false });
-        self.set_guests(0);
-        self.velocity.fill(Vec2::zeros());
-        self.refresh_shares(&vec![Vec2::zeros(); self.model.nodes()]);
-        Ok(())
     }
 
     /// Begins shaking: sand becomes plastic, the base compliant, and whatever force the new base and the state
@@ -351,6 +369,12 @@ impl Simulation {
                 });
             }
         }
+        if self.flowing.is_some() {
+            return Err(SolverError::Order { call: "begin_shaking", needs: "ground that has not flowed" });
+        }
+        if let Some(run_out) = &stage.run_out {
+            run_out.validate(&self.model, &stage)?;
+        }
         if self.model.numerics.dispersion_correction && stage.free_field.contains(&true) {
             return Err(SolverError::InvalidInput {
                 name: "dispersion_correction",
@@ -360,7 +384,8 @@ impl Simulation {
         }
         self.counters = Counters::default();
         self.rayleigh = stage.rayleigh.map(|law| RayleighDamping::new(law, self.points.len()));
-        let corrected = self.model.numerics.dispersion_correction;
+        // Ground that flows is slow beside its waves.
+        let corrected = self.model.numerics.dispersion_correction && stage.run_out.is_none();
         self.dispersion = corrected.then(|| Dispersion::new(&self.model, self.points.len()));
         let absorbs = stage.base.vertical == Vertical::Absorbing;
         // Another stage of shaking keeps the columns of the one before.
@@ -368,7 +393,10 @@ impl Simulation {
             Active::Shaking(before) => (true, before.free_field),
             _ => (false, None),
         };
-        if goes_on {
+        if let Some(run_out) = &stage.run_out {
+            free_field = None;
+            self.hold_edges(run_out);
+        } else if goes_on {
             self.renew_geometry(free_field.as_mut());
         } else {
             self.released = Some(self.position.clone());
@@ -377,6 +405,8 @@ impl Simulation {
                 base_condition(self.model.numerics.operators, absorbs),
                 stage.free_field,
             ));
+        }
+        if !goes_on {
             self.velocity.fill(Vec2::zeros());
             self.acceleration.fill(Vec2::zeros());
             self.soil = SoilField::plastic(&self.model, &mut self.points, None)?;
@@ -387,7 +417,8 @@ impl Simulation {
         for point in &mut self.points {
             point.strain = [0.0; 3];
         }
-        let impedance = self.base_impedance(&stage.base)?;
+        // Ground that flows leaves the points of its base.
+        let impedance = if self.flowing.is_some() { Vec::new() } else { self.base_impedance(&stage.base)? };
         let edges = (&self.edges, self.position.as_slice());
         let mut base = CompliantBase::new(&self.model, edges, &self.mass, impedance, &stage.base);
         if let Some(dispersion) = &self.dispersion {
@@ -408,8 +439,10 @@ impl Simulation {
         let scheme = self.flow_scheme(stage.time_step_factor);
         let before = self.flow.take();
         self.flow = Flow::new(self.ground(&outline), scheme, &stage.conditions)?;
-        if let (Some(flow), Some(before)) = (&mut self.flow, before) {
-            flow.set_excess(|excess| excess.copy_from_slice(before.excess()));
+        if let Some(run_out) = &stage.run_out {
+            self.stand_in_water(run_out, before.as_ref())?;
+        } else if let (Some(flow), Some(before)) = (&mut self.flow, before) {
+            flow.set_excess(|excess| excess.copy_from_slice(before.own_excess()));
         }
         if let Some(free_field) = &mut free_field {
             self.set_guests(free_field.guests());
@@ -450,9 +483,62 @@ impl Simulation {
             probes,
             stage,
         })));
-        if !goes_on {
+        if self.flowing.is_some() {
+            self.soil.let_flow();
+            self.weigh();
+        } else if !goes_on {
             self.store_reaction();
         }
+        Ok(())
+    }
+
+    /// Holds base and sides as in statics where they now stand, and lets go of the ground.
+    fn hold_edges(&mut self, run_out: &RunOut) {
+        let mut outline = self.present_outline();
+        for (side, is_open) in outline.sides.iter_mut().zip(run_out.open) {
+            *side = side.filter(|_| !is_open);
+        }
+        let lattice = {
+            let Model { position, volume, .. } = &self.model;
+            let edges = (&self.model.outline, Walls::statics(&self.model.outline));
+            Geometry::build(&self.model, position, volume, edges, None).sharpness(volume)
+        };
+        self.set_guests(0);
+        (self.released, self.contacts) = (None, None);
+        self.walls = Walls::statics(&outline);
+        self.flowing = Some(Flowing {
+            viscosity: Viscosity::new(run_out.viscosity, self.model.nodes()),
+            outline,
+            lattice,
+            pace: 1.0,
+            free_surface: Vec::new(),
+        });
+        // The flow is made anew.
+        let flow = self.flow.take();
+        self.rebuild_geometry();
+        self.flow = flow;
+        self.refresh_present_shares();
+    }
+
+    /// Puts ground that flows, with the pore water that it had `before`, into the still water around it.
+    fn stand_in_water(&mut self, run_out: &RunOut, before: Option<&Flow>) -> Result<(), SolverError> {
+        let (Some(mut flow), Some(water)) = (self.flow.take(), self.model.water) else { return Ok(()) };
+        let still = match &run_out.still_water {
+            Some(line) => StillWater::new(water, line)?,
+            None => StillWater::at_rest(&self.model, water),
+        };
+        let at_rest = self.model.neutral_stress();
+        let gained = |node| before.map_or(0.0, |flow| flow.neutral(node));
+        let neutral = at_rest.iter().enumerate().map(|(node, rest)| rest + gained(node)).collect();
+        let saturation = before.and_then(Flow::saturation);
+        let holds_air = |node| {
+            saturation.as_ref().map_or_else(|| self.model.saturation(node), |of_node| of_node(node)) < 1.0
+        };
+        let holds_air = (0..self.model.nodes()).map(holds_air).collect();
+        let excess: Vec<f64> =
+            (0..self.model.nodes()).map(|node| before.map_or(0.0, |flow| flow.excess(node))).collect();
+        flow.stand_in(still, self.ground(&self.present_outline()), (neutral, &excess), holds_air);
+        self.flow = Some(flow);
         Ok(())
     }
 
@@ -505,6 +591,17 @@ impl Simulation {
     /// constant force, so that the soil is not struck by the change: blows of a few hundredths of gravity would liquefy
     /// it further.
     pub(crate) fn renew_geometry(&mut self, free_field: Option<&mut FreeField>) {
+        if self.flowing.is_some() {
+            let before = self.mass.clone();
+            self.rebuild_geometry();
+            // Water that pores have taken in was at rest; what they have lost leaves with them.
+            for ((v, before), mass) in self.velocity.iter_mut().zip(before).zip(&self.mass) {
+                *v *= (before / mass).min(1.0);
+            }
+            self.weigh();
+            self.refresh_present_shares();
+            return;
+        }
         let mut before = self.static_force();
         self.rebuild_geometry();
         let after = self.static_force();
@@ -518,9 +615,7 @@ impl Simulation {
         for ((constant, before), after) in self.constant_force.iter_mut().zip(before).zip(after) {
             *constant += before - after;
         }
-        let velocity = std::mem::take(&mut self.velocity);
-        self.refresh_shares(&velocity);
-        self.velocity = velocity;
+        self.refresh_present_shares();
     }
 
     /// Makes room for the velocities of free-field columns behind those of the nodes.
@@ -532,6 +627,9 @@ impl Simulation {
 
     /// The edges where they now stand: in shaking they go with the nodes along them, as far as they are free to.
     fn present_outline(&self) -> Outline {
+        if let Some(Flowing { outline, .. }) = &self.flowing {
+            return outline.clone();
+        }
         let Some(released) = &self.released else { return self.model.outline.clone() };
         let moved = |nodes: &[usize], free: [bool; 2]| {
             let total: Vec2 = nodes.iter().map(|&node| self.position[node] - released[node]).sum();
@@ -561,6 +659,7 @@ impl Simulation {
             geometry: &self.geometry,
             position: &self.position,
             edges: (outline, self.walls),
+            free_surface: self.flowing.as_ref().map(|flowing| flowing.free_surface.as_slice()),
         }
     }
 
@@ -586,7 +685,7 @@ impl Simulation {
             }
         });
         if let Some(free_field) = &mut shaking.free_field {
-            free_field.set_excess(&self.edges, flow.excess());
+            free_field.set_excess(&self.edges, flow.own_excess());
         }
         self.store_load();
         Ok(())
@@ -610,9 +709,7 @@ impl Simulation {
         for (slot, &user) in self.velocity.iter_mut().zip(&self.order) {
             *slot = velocity[user].into();
         }
-        let velocity = std::mem::take(&mut self.velocity);
-        self.refresh_shares(&velocity);
-        self.velocity = velocity;
+        self.refresh_present_shares();
         Ok(())
     }
 
@@ -636,6 +733,7 @@ impl Simulation {
         let outline = self.present_outline();
         let (volume, walls) = (self.phases.volume(), (&outline, self.walls));
         self.geometry = Geometry::build(&self.model, &self.position, volume, walls, Some(previous));
+        self.follow_flow();
         if let Some(mut flow) = self.flow.take() {
             flow.follow(self.ground(&outline), self.time);
             self.flow = Some(flow);
@@ -679,6 +777,25 @@ impl Simulation {
         if let Some(rayleigh) = &mut self.rayleigh {
             rayleigh.add_stress(false, &self.geometry, velocity, &self.points, &mut self.shares);
         }
+    }
+
+    /// The same from the present motion.
+    fn refresh_present_shares(&mut self) {
+        let velocity = std::mem::take(&mut self.velocity);
+        self.refresh_shares(&velocity);
+        self.velocity = velocity;
+    }
+
+    /// Lets what flowing ground knows of its geometry follow, its free surface if water may cross it.
+    fn follow_flow(&mut self) {
+        let Some(mut flowing) = self.flowing.take() else { return };
+        flowing.follow(self.geometry.sharpness(self.phases.volume()));
+        if self.model.water.is_some() {
+            let edges = (&flowing.outline, self.walls);
+            let volume = self.phases.volume();
+            flowing.free_surface = free_surface(self.threads > 1, &self.model, &self.position, volume, edges);
+        }
+        self.flowing = Some(flowing);
     }
 
     /// Strength `xi / dx` of the velocity filter, 1/m.
@@ -727,6 +844,7 @@ impl Simulation {
         factor: f64,
     ) -> (f64, Criterion) {
         let corrected = self.dispersion.is_some();
+        let viscosity = self.flowing.as_ref().map(|flowing| flowing.viscosity.coefficient());
         // Nodes are sorted by region: each is one stretch.
         let mut first = 0;
         let (dt, criterion) = self
@@ -742,11 +860,13 @@ impl Simulation {
             })
             .filter(|(_, stiffness)| *stiffness > 0.0)
             .map(|(region, stiffness)| {
-                region_limit(&self.model, region, stiffness, coupling, &self.spectrum, rayleigh, corrected)
+                let place = (&self.model, region);
+                region_limit(place, stiffness, coupling, &self.spectrum, rayleigh, (corrected, viscosity))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .unwrap_or_default();
-        (factor * dt, criterion)
+        let pace = self.flowing.as_ref().map_or(1.0, |flowing| flowing.pace);
+        (factor * pace * dt, criterion)
     }
 
     /// The same, and no longer than free-field columns allow.
@@ -832,6 +952,9 @@ impl Simulation {
             _ => conservative_force(&self.geometry, j, velocity, &self.shares, &self.points),
         };
         force += water;
+        if let Some(Flowing { viscosity, .. }) = &self.flowing {
+            force += viscosity.force(j);
+        }
         if let Some(rayleigh) = &self.rayleigh {
             force += rayleigh.force(&self.geometry, j, self.mass[j], velocity);
         }
@@ -1086,6 +1209,10 @@ impl Simulation {
         if let Some(free_field) = &mut shaking.free_field {
             free_field.begin_step(dt, &self.velocity)?;
         }
+        if let Some(Flowing { viscosity, .. }) = &mut self.flowing {
+            let motion = (self.position.as_slice(), self.velocity.as_slice(), self.phases.volume());
+            viscosity.update(self.threads > 1, (&self.model, &self.geometry), &self.points, motion);
+        }
         self.accelerate(dt);
         let motion = (self.velocity.as_mut_slice(), self.acceleration.as_mut_slice());
         let push = &mut shaking.side_push;
@@ -1106,6 +1233,11 @@ impl Simulation {
         if shaking.stage.local_damping > 0.0 {
             local_damping = self.damp_locally(shaking.stage.local_damping, dt);
         }
+        if let Some(Flowing { outline, .. }) = &self.flowing {
+            let motion = (self.velocity.as_mut_slice(), self.acceleration.as_mut_slice());
+            let section = (&self.model, outline);
+            self.counters.edge_contacts += stick_to_edges(section, &self.position, motion.0, motion.1, dt);
+        }
         let base = shaking.base.dashpots().work(dt, &self.velocity);
         let sides = self.work_of(&shaking.side_push, dt);
         shaking.energy.step(&StepWork { base, sides, local_damping, ..self.step_work(dt) });
@@ -1113,6 +1245,9 @@ impl Simulation {
         self.record(shaking);
         for (x, v) in self.position.iter_mut().zip(&self.velocity) {
             *x += v * dt;
+        }
+        if let Some(flow) = &mut self.flow {
+            flow.carry(&self.position);
         }
         let work = self.update_stress(dt)?;
         shaking.energy.strain(work);
@@ -1131,7 +1266,8 @@ impl Simulation {
         if is_over {
             shaking.recorder.finish(self.time);
         }
-        if self.step.is_multiple_of(CHECK_INTERVAL) {
+        // Ground that flows outgrows its weights in a few steps.
+        if self.flowing.is_some() || self.step.is_multiple_of(CHECK_INTERVAL) {
             self.check(shaking)?;
         }
         Ok(())
@@ -1160,6 +1296,9 @@ impl Simulation {
     /// Whether some stress node is strained beyond what its weights bear.
     fn is_strained(&self) -> bool {
         let limit = self.model.numerics.geometry_strain_limit();
+        if self.flowing.is_some() && self.geometry.is_left(&self.model, &self.position) {
+            return true;
+        }
         self.points.iter().any(|point| point.deformation.magnitude() > limit)
     }
 
@@ -1167,8 +1306,8 @@ impl Simulation {
     /// moved yet: every quantity of a sample belongs to the same instant.
     fn record(&self, shaking: &mut ActiveShaking) {
         if let (Some(envelope), Some(flow)) = (&mut shaking.pressure_envelope, &self.flow) {
-            for (largest, &excess) in envelope.iter_mut().zip(flow.excess()) {
-                *largest = largest.max(excess);
+            for (node, largest) in envelope.iter_mut().enumerate() {
+                *largest = largest.max(flow.excess(node));
             }
         }
         if let Some(envelope) = &mut shaking.strain_envelope {
@@ -1190,7 +1329,7 @@ impl Simulation {
                 acceleration += self.acceleration[j] * weight;
                 velocity += (self.velocity[j] - self.acceleration[j] * (0.5 * self.dt)) * weight;
                 displacement += (self.position[j] - self.initial_position[j]) * weight;
-                excess += self.flow.as_ref().map_or(0.0, |flow| flow.excess()[j]) * weight;
+                excess += self.flow.as_ref().map_or(0.0, |flow| flow.excess(j)) * weight;
             }
             for vector in [acceleration, velocity, displacement] {
                 put(vector.x);
@@ -1219,7 +1358,7 @@ impl Simulation {
     fn guard(&self) -> Result<(), SolverError> {
         self.check_finite("velocity", |simulation, j| simulation.velocity[j].norm(), RUNAWAY_SPEED)?;
         match &self.flow {
-            Some(flow) => self.check_finite("pore pressure", |_, j| flow.excess()[j].abs(), f64::INFINITY),
+            Some(flow) => self.check_finite("pore pressure", |_, j| flow.excess(j).abs(), f64::INFINITY),
             None => Ok(()),
         }
     }
@@ -1404,6 +1543,9 @@ impl Simulation {
         if let Some(rayleigh) = &self.rayleigh {
             arrays.push(("viscous_stress", rayleigh.bytes()));
         }
+        if let Some(flowing) = &self.flowing {
+            arrays.push(("run_out", flowing.bytes()));
+        }
         if let Some(dispersion) = &self.dispersion {
             let contacts = self.contacts.as_ref().map_or(0, Contacts::bytes);
             arrays.push(("inertia_correction", dispersion.bytes() + contacts));
@@ -1454,7 +1596,7 @@ impl Simulation {
     /// Excess pore pressure since shaking began, kPa; `None` without water.
     pub fn excess_pore_pressure(&self) -> Option<Vec<f64>> {
         self.model.water?;
-        Some(self.in_user_order(|j| self.flow.as_ref().map_or(0.0, |flow| flow.excess()[j])))
+        Some(self.in_user_order(|j| self.flow.as_ref().map_or(0.0, |flow| flow.excess(j))))
     }
 
     /// Degree of saturation; `None` where it cannot change: without retention curves, and before shaking.

@@ -106,6 +106,8 @@ pub struct SoilField {
     /// Of the chunks of the longest group, in a step. A field that was restored has none before its first step.
     #[serde(skip)]
     outcomes: Vec<Outcome>,
+    /// Largest strain component of one step.
+    largest_step: f64,
 }
 
 /// The velocity field of a step, and what the force loop wants of it.
@@ -115,6 +117,7 @@ struct Flowing<'a> {
     velocity: &'a [Vec2],
     filter: f64,
     dt: f64,
+    largest_step: f64,
 }
 
 /// Rows under a model with a state, whichever it is: the call through the table is one for each group and step.
@@ -152,7 +155,7 @@ impl<M: SoilModel> Plastic for Rowed<M> {
         integrator: &Integrator,
     ) {
         let model = &self.model;
-        let Flowing { geometry, velocity, filter, dt } = flowing;
+        let Flowing { geometry, velocity, filter, dt, largest_step } = flowing;
         for_each_chunk(threaded, Rows { a, b, c: &mut self.states }, outcomes, |first, rows, outcome| {
             *outcome = Outcome::default();
             for k in 0..rows.a.len() {
@@ -160,7 +163,9 @@ impl<M: SoilModel> Plastic for Rowed<M> {
                 let s = first_row + first + k;
                 let motion = motion(geometry, s, velocity);
                 let increment = motion.advance(&mut point.deformation, dt);
-                match bounded(&increment).and_then(|()| model.update(state, &increment, integrator)) {
+                match bounded(&increment, largest_step)
+                    .and_then(|()| model.update(state, &increment, integrator))
+                {
                     Ok(report) => outcome.report.merge(&report),
                     Err(error) => {
                         outcome.failure = Some((s, error));
@@ -196,13 +201,15 @@ impl<M: SoilModel> Plastic for Rowed<M> {
 /// Largest strain component of one step: a thousand times what an earthquake does, and far below what plasticity
 /// would need minutes to follow. Beyond it the run has diverged.
 const LARGEST_STEP: f64 = 0.02;
+/// The same of ground that flows: where a few grains touch, a step may turn them over.
+const LARGEST_FLOWING_STEP: f64 = 0.5;
 
 /// Refuses the strain of a diverging run before the soil model goes through it.
-fn bounded(increment: &StrainIncrement) -> Result<(), SoilError> {
+fn bounded(increment: &StrainIncrement, limit: f64) -> Result<(), SoilError> {
     let value = increment.xx.abs().max(increment.yy.abs()).max(increment.xy.abs());
     // NaN goes on to the model, which names it.
-    if value > LARGEST_STEP {
-        return Err(SoilError::StrainIncrementTooLarge { value, limit: LARGEST_STEP });
+    if value > limit {
+        return Err(SoilError::StrainIncrementTooLarge { value, limit });
     }
     Ok(())
 }
@@ -274,7 +281,13 @@ impl SoilField {
             .map(|(region, rows)| Ok(Group { region, law: law(region, rows.clone())?, rows }))
             .collect::<Result<Vec<_>, SolverError>>()?;
         let longest = groups.iter().map(|group| group.rows.len()).max().unwrap_or(0);
-        Ok(Self { groups, outcomes: vec![Outcome::default(); chunks(longest)] })
+        let outcomes = vec![Outcome::default(); chunks(longest)];
+        Ok(Self { groups, outcomes, largest_step: LARGEST_STEP })
+    }
+
+    /// Lets the soil flow.
+    pub fn let_flow(&mut self) {
+        self.largest_step = LARGEST_FLOWING_STEP;
     }
 
     /// Moves every stress node through one step: strain from the velocity field, stress from the soil model,
@@ -320,7 +333,7 @@ impl SoilField {
                     });
                 }
                 Law::Plastic(_, law) => {
-                    let flowing = Flowing { geometry, velocity, filter, dt };
+                    let flowing = Flowing { geometry, velocity, filter, dt, largest_step: self.largest_step };
                     law.step(threaded, flowing, first_row, (a, b), outcomes, integrator);
                     for outcome in &*outcomes {
                         if let Some((s, source)) = &outcome.failure {

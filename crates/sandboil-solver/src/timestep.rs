@@ -20,6 +20,11 @@ pub const CORRECTED_FILTER: f64 = 2.55;
 const UNDRAINED_COEFFICIENT: f64 = 1.7;
 /// The same where pressure is prescribed nowhere: undrained soil.
 const FREE_UNDRAINED_COEFFICIENT: f64 = 0.9;
+/// Damping ratio of the fastest wave by a unit of artificial viscosity: its rate is at most `2 alpha c / h`.
+const VISCOSITY_RATIO: f64 = 0.5;
+/// Share of the lattice's drainage that is left to a few nodes of flowing ground which touch each other alone: through the
+/// surface, `2/dx^2` of up to `8/dx^2`.
+const FLOWING_DRAINAGE: f64 = 0.25;
 /// Explicit diffusion: `dt <= 0.65 dx^2 C / k`.
 const DIFFUSION_COEFFICIENT: f64 = 0.65;
 /// Largest eigenvalue of the velocity filter over `xi C_s / dx`.
@@ -159,15 +164,15 @@ fn left_by_damping(ratio: f64) -> f64 {
 ///
 /// `spectrum` belongs to implicit diffusion and is read only there. Rayleigh damping acts on the skeleton alone: its
 /// rate is that of the skeleton's fastest wave, whatever the water adds to the frequency. `corrected` says whether inertia
-/// is corrected for dispersion.
+/// is corrected for dispersion. No surface of ground that flows, braked
+/// by an artificial `viscosity`, is tied to a pressure.
 pub fn region_limit(
-    model: &Model,
-    region: usize,
+    (model, region): (&Model, usize),
     skeleton_stiffness: f64,
     coupling: PressureCoupling,
     spectrum: &PressureSpectrum,
     rayleigh: Option<&Rayleigh>,
-    corrected: bool,
+    (corrected, viscosity): (bool, Option<f64>),
 ) -> (f64, Criterion) {
     let h = model.smoothing_length();
     let (response, filtered) = if corrected { (CORRECTED_RESPONSE, CORRECTED_FILTER) } else { (1.0, 1.0) };
@@ -175,7 +180,8 @@ pub fn region_limit(
     let undamped = |coefficient: f64, stiffness: f64| coefficient * h / (stiffness / density).sqrt();
     let longest = undamped(DRAINED_COEFFICIENT, skeleton_stiffness);
     let rate = rayleigh.map_or(0.0, |damping| damping.rate(2.0 / longest));
-    let filter = filter_ratio(model) * filtered / response.sqrt();
+    let braked = VISCOSITY_RATIO * viscosity.unwrap_or(0.0);
+    let filter = filter_ratio(model) * filtered / response.sqrt() + braked;
     let viscous = |limit: f64| 0.25 * rate * limit;
     let wave = |coefficient: f64, stiffness: f64, criterion: Criterion| {
         let limit = undamped(coefficient, stiffness);
@@ -189,7 +195,11 @@ pub fn region_limit(
     }
     let water = model.water_stiffness(model.regions[region].porosity);
     let diffusivity = model.pressure_diffusivity(region, |k| k.major);
-    let coefficient = if diffusivity > 0.0 { UNDRAINED_COEFFICIENT } else { FREE_UNDRAINED_COEFFICIENT };
+    let coefficient = if diffusivity > 0.0 && viscosity.is_none() {
+        UNDRAINED_COEFFICIENT
+    } else {
+        FREE_UNDRAINED_COEFFICIENT
+    };
     let undrained = wave(coefficient, skeleton_stiffness + water, Criterion::UndrainedWave);
     let combined = if undrained.0 < drained.0 { undrained } else { drained };
     if diffusivity == 0.0 {
@@ -203,10 +213,14 @@ pub fn region_limit(
     }
     let left = left_by_damping(filter + viscous(longest));
     // Across the grain the water drains last.
-    let diffusivity = model.pressure_diffusivity(region, |k| k.minor);
+    let left_open = if viscosity.is_some() { FLOWING_DRAINAGE } else { 1.0 };
+    let diffusivity = left_open * model.pressure_diffusivity(region, |k| k.minor);
     // Water that drains at grid scale within a step stiffens the short waves no more.
-    let stable =
-        |dt: f64| (dt / drained.0).powi(2) + spectrum.share(water / density, diffusivity, dt / left) <= 1.0;
+    let at_edge = (UNDRAINED_COEFFICIENT / coefficient).powi(2);
+    let stable = |dt: f64| {
+        let share = spectrum.share(at_edge * water / density, diffusivity, dt / left);
+        (dt / drained.0).powi(2) + share <= 1.0
+    };
     let (mut low, mut high) = (combined.0.min(drained.0), drained.0);
     if !stable(low) {
         return combined;

@@ -79,6 +79,7 @@ pub fn shaking(wave: Option<UpgoingWave>, duration: f64, probes: Vec<Vec2>) -> S
         record_columns: None,
         local_damping: 0.0,
         rayleigh: None,
+        run_out: None,
         time_step_factor: SHAKING_FACTOR,
         probes,
         history_interval: 0.001,

@@ -10,6 +10,7 @@ mod moving_water;
 mod open_edges;
 mod rayleigh;
 mod resume;
+mod run_out;
 mod seepage;
 mod shear_cell;
 mod stages;
