@@ -648,6 +648,7 @@ mod tests {
         model::Conductivity,
         skeleton::tests::square_block,
     };
+    use sandboil_soil::VanGenuchten;
     use sandboil_sph::Period;
 
     fn flow_of(model: &Model, scheme: FlowScheme) -> (Flow, Geometry) {
@@ -744,5 +745,41 @@ mod tests {
         assert!(flow.step(false, &geometry.flow.unwrap(), &points, (&still, &acceleration), (dt, dt)));
         let expected = dt * (8.0 / 0.5) * CONDUCTIVITY / model.gravity * 0.7;
         assert!((flow.excess[40] - expected).abs() < 1e-12, "{} {expected}", flow.excess[40]);
+    }
+
+    /// In soil that holds air, volume strain presses water out by the share of it that is water, `S_r` in Eq. 3, and
+    /// inertia drives it by what air leaves open, `k_r`.
+    #[test]
+    fn air_takes_its_part_of_strain_and_of_inertia() {
+        const CONDUCTIVITY: f64 = 0.3;
+        const TABLE: f64 = 3.5;
+        let curve = VanGenuchten::new(2.0, 2.0, 0.0, 1.0).unwrap();
+        let mut model = square_block(9);
+        model.surface_elevation = vec![1e3; model.nodes()];
+        model.water = Some(Water { unit_weight: 10.0, bulk_modulus: 8.0 });
+        model.regions[0].hydraulic_conductivity = Conductivity::isotropic(CONDUCTIVITY);
+        model.regions[0].retention = Some(curve);
+        // Hydrostatic: no head drives anything.
+        model.pore_pressure = model.position.iter().map(|at| 10.0 * (TABLE - at.y)).collect();
+        model.saturation = model.position.iter().map(|at| curve.at(TABLE - at.y).saturation).collect();
+        let moisture = curve.at(TABLE - model.position[40].y);
+        assert!(moisture.saturation < 0.8 && moisture.relative_conductivity < 0.3);
+        let spread = |x: f64, y: f64| -> Vec<Vec2> {
+            model.position.iter().map(|at| Vec2::new(x * at.x, y * at.y)).collect()
+        };
+        let still = vec![Vec2::zeros(); model.nodes()];
+        let points = vec![StressPoint::default(); STRESS_NODES * model.nodes()];
+        let dt = 1e-6;
+        let stiffness = 1.0 / (0.5 * (moisture.saturation / 8.0 + moisture.capacity / 10.0));
+        for (velocity, acceleration, rate) in [
+            (spread(0.1, 0.2), still.clone(), -moisture.saturation * 0.3),
+            (still, spread(0.2, 0.5), moisture.relative_conductivity * CONDUCTIVITY / model.gravity * 0.7),
+        ] {
+            let (mut flow, geometry) = flow_of(&model, FlowScheme::ExplicitWithAcceleration);
+            let motion = (velocity.as_slice(), acceleration.as_slice());
+            assert!(flow.step(false, &geometry.flow.unwrap(), &points, motion, (dt, dt)));
+            let found = flow.excess[40] / dt;
+            assert!((found - stiffness * rate).abs() < 1e-6 * stiffness * rate.abs(), "{found} {rate}");
+        }
     }
 }
