@@ -12,13 +12,16 @@ from math import cos, dist, radians, sin
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
+import shapely
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 from pydantic.config import JsonDict
+from shapely.geometry.base import BaseGeometry
 
 from ._errors import InvalidInput
 from ._model import MAX_PARTS, MAX_POINTS, Many, Model, Number, as_float
 from .boundaries import COORDINATE_TOLERANCE, Point
 from .materials import NonNegative, Positive
+from .outline import Outline
 
 _LAYERS: JsonDict = {"remedy": "layered soils have several times less across their layers, but not none"}
 _SERIES: JsonDict = {"remedy": "a number, or pairs of time and value as [[0, 4.0], [3600, 3.0]]"}
@@ -306,6 +309,21 @@ class Drain(Model):
 
 AnyCondition = Head | Pressure | Flux | Rain | Reservoir | SeepageFace | Drain
 Condition = Annotated[AnyCondition, Field(discriminator="kind")]
+
+
+def line_of(condition: AnyCondition, outline: Outline) -> BaseGeometry:
+    """The line on which a condition holds at the edges of a section; empty where its part lies beyond."""
+    if isinstance(condition, Drain):
+        return shapely.LineString(condition.points)
+    if not isinstance(condition.on, str):
+        return shapely.LineString(condition.on)
+    line = outline.edges[condition.on]
+    if condition.x is None:
+        return line
+    y0, y1 = line.bounds[1] - 1.0, line.bounds[3] + 1.0
+    part = shapely.intersection(line, shapely.box(condition.x[0], y0, condition.x[1], y1))
+    return shapely.line_merge(part) if part.geom_type == "MultiLineString" else part
+
 
 # Conditions that tell the level of the pressure; a flux alone leaves it open.
 REFERENCES = ("head", "pressure", "rain", "reservoir", "seepage-face", "drain")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
@@ -55,6 +56,23 @@ class Outline:
             right=(float(y[end]), float(surface[-1, 1])),
             surface=_without_idle_corners(surface),
         )
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Left and right end of the section, m."""
+        return float(self.base[0, 0]), float(self.base[-1, 0])
+
+    @property
+    def edges(self) -> dict[str, BaseGeometry]:
+        """Every edge by its name: a line, which has no length where there is none."""
+        x0, x1 = self.ends
+        lines: dict[str, Any] = {
+            "surface": self.surface,
+            "base": self.base,
+            "left": [(x0, level) for level in self.left],
+            "right": [(x1, level) for level in self.right],
+        }
+        return {name: shapely.LineString(line) for name, line in lines.items()}
 
     @property
     def base_is_level(self) -> bool:

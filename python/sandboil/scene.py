@@ -20,7 +20,7 @@ from pydantic import Field, StrictBool, model_validator
 from pydantic.config import JsonDict
 from shapely.geometry.base import BaseGeometry
 
-from . import _core, _toml
+from . import _core, _scene_water, _toml
 from ._errors import InvalidInput
 from ._model import MAX_PARTS, MAX_POINTS, Many, Model, Number, field_remedy
 from ._motion_spec import GivenMotion, MotionSpec
@@ -34,22 +34,13 @@ from .boundaries import (
     Sides,
 )
 from .hydraulics import (
-    REFERENCES,
     AnyCondition,
     AnyConductivity,
     Condition,
     Conductivity,
-    Drain,
-    Pressure,
     Seepage,
-    SeepageFace,
     VanGenuchten,
-    described,
-    frozen,
-    heads_of,
-    prescribed,
-    series_of,
-    value_at,
+    line_of,
 )
 from .materials import Elastic, Material, PM4Sand, Positive
 from .outline import Outline
@@ -821,9 +812,7 @@ class Scene(Model):
         self._check_overlaps()
         self._check_section()
         self._check_spacing()
-        self._check_water()
-        self._check_seepage()
-        self._check_moving_water()
+        _scene_water.check(self)
         self._check_densities()
         self._check_materials()
         self._check_stages()
@@ -972,334 +961,6 @@ class Scene(Model):
                     f"must not exceed the least extent of any region, {thickness:g} m ({region.name})",
                     "a fifth of the thinnest layer, or join layers that are thinner",
                 )
-
-    def _check_water(self) -> None:
-        if self.water is None and self.water_table is not None:
-            raise InvalidInput(
-                "scene.water", None, "is required when there is a water table", "water = Water()"
-            )
-        if self.water is not None and self.water_table is None:
-            raise InvalidInput(
-                "scene.water_table",
-                None,
-                "is required when there is water",
-                "WaterTable(depth=0) is at the surface",
-            )
-        if self.water_table is not None and self.water_table.above != "dry":
-            for i, region in self._regions_above_water():
-                if region.retention is None and self.seepage is None:
-                    raise InvalidInput(
-                        f"scene.regions[{i}].retention",
-                        None,
-                        f"is required of soil above the water table (region {region.name!r})",
-                        "VanGenuchten(alpha=7.5, n=1.89) is a sandy loam; or WaterTable(..., above='dry')",
-                    )
-
-    def _regions_above_water(self) -> list[tuple[int, Region]]:
-        """Regions of which a part lies above the water table, with their places."""
-        found = []
-        for i, region in enumerate(self.regions):
-            corners = shapely.get_coordinates(region.geometry)
-            # Between its corners the water table may bend too.
-            xs = [x for x, _ in (self.water_table.points or ())] if self.water_table else []
-            x0, y0, x1, y1 = region.geometry.bounds
-            for x in xs:
-                if x0 < x < x1:
-                    line = region.geometry.intersection(shapely.LineString([(x, y0), (x, y1)]))
-                    if not line.is_empty:
-                        corners = np.vstack([corners, [(x, line.bounds[3])]])
-            if (corners[:, 1] > self.water_level_at(corners[:, 0]) + COORDINATE_TOLERANCE).any():
-                found.append((i, region))
-        return found
-
-    def _check_seepage(self) -> None:
-        for i, stage in enumerate(self.stages):
-            if not isinstance(stage, Seepage):
-                continue
-            path = f"scene.stages[{i}]"
-            if i > 0:
-                raise InvalidInput(
-                    f"{path}.kind",
-                    "seepage",
-                    "must be the first stage: the ground is at rest",
-                    "water that flows while the ground moves is computed by the other stages themselves",
-                )
-            if self.water is None:
-                raise InvalidInput("scene.water", None, "is required by a seepage stage", "water = Water()")
-            if not any(region.conductivity[0] for region in self.regions):
-                raise InvalidInput(
-                    "scene.regions",
-                    [r.name for r in self.regions],
-                    "must hold one that water flows through",
-                    "hydraulic_conductivity = 1e-5 (m/s) is a fine sand",
-                )
-            if stage.duration is None and not any(c.kind in REFERENCES for c in stage.conditions):
-                raise InvalidInput(
-                    f"{path}.conditions",
-                    [c.kind for c in stage.conditions],
-                    "must tell the pressure somewhere: with fluxes alone no state is steady, or any level is",
-                    "a Head, a Reservoir, a SeepageFace, or a duration",
-                )
-            for k, condition in enumerate(stage.conditions):
-                self._check_condition(stage, condition, f"{path}.conditions[{k}]")
-            self._check_shared_edges(stage, path)
-            self._check_desaturation(stage, path)
-
-    def _check_moving_water(self) -> None:
-        """Conditions of the stages in which the ground moves."""
-        for i, stage in enumerate(self.stages):
-            if not isinstance(stage, Shaking) or not stage.conditions:
-                continue
-            path = f"scene.stages[{i}].conditions"
-            kinds = [condition.kind for condition in stage.conditions]
-            if self.water is None:
-                raise InvalidInput(
-                    path, kinds, "go with water, of which the scene has none", "water = Water()"
-                )
-            if not any(region.conductivity[0] for region in self.regions):
-                raise InvalidInput(
-                    path,
-                    kinds,
-                    "need soil that water flows through",
-                    "hydraulic_conductivity = 1e-5 (m/s) is a fine sand",
-                )
-            for k, condition in enumerate(stage.conditions):
-                self._check_condition(stage, condition, f"{path}[{k}]")
-                self._check_beside_columns(condition, f"{path}[{k}]")
-                self._check_flooded(condition, f"{path}[{k}]")
-            self._check_shared_edges(stage, f"scene.stages[{i}]")
-
-    def _check_flooded(self, condition: Any, path: str) -> None:
-        """Soil that is dry at rest takes no water: it has no retention curve to tell how."""
-        if not self.is_partly_saturated or self.holds_suction or isinstance(condition, Drain | SeepageFace):
-            return
-        line = shapely.segmentize(self.condition_line(condition), self.spacing)
-        x, y = shapely.get_coordinates(line).T
-        dry = y > self.water_level_at(x) + COORDINATE_TOLERANCE
-        told = heads_of(condition)
-        comes = np.inf if told is None else max(value for _, value in told[1])
-        if (dry & (y < comes)).any():
-            raise InvalidInput(
-                path,
-                described(condition, 0.0),
-                "must not bring water to soil that is dry above the water table",
-                "WaterTable(..., above='retention') and a retention curve for the soil",
-            )
-
-    def _check_beside_columns(self, condition: Any, path: str) -> None:
-        """Free-field columns know no conditions of their own."""
-        if "free-field" not in self.side_kinds or isinstance(condition, Drain):
-            return
-        line = self.condition_line(condition)
-        if self._is_beside_column(line):
-            raise InvalidInput(
-                f"{path}.on",
-                condition.on,
-                "must not be a free-field side, whose column tells the water there",
-                "leave the condition out",
-            )
-        on_surface = line.distance(shapely.LineString(self.outline.surface)) <= COORDINATE_TOLERANCE
-        if on_surface and (len(series_of(condition)) > 1 or self._value_at_rest(condition) is None):
-            name = prescribed(condition) or "on"
-            raise InvalidInput(
-                f"{path}.{name}",
-                getattr(condition, name),
-                "must stay on the surface what it was in the seepage stage, beside free-field sides: their "
-                "columns keep the water they have",
-                "sides = Roller(), far away",
-            )
-
-    def _is_beside_column(self, line: BaseGeometry) -> bool:
-        x = line.bounds[0::2]
-        ends = [
-            end for kind, end in zip(self.side_kinds, self.bounds[0::2], strict=True) if kind == "free-field"
-        ]
-        return any(np.allclose(x, end, atol=COORDINATE_TOLERANCE, rtol=0.0) for end in ends)
-
-    def _value_at_rest(self, condition: Any) -> float | None:
-        """What a condition prescribed at the end of seepage (0 for nothing); None if it did not hold."""
-        if self.seepage is None:
-            return None
-        line = self.condition_line(condition)
-        for before in self.seepage.conditions:
-            if before.kind == condition.kind and self.condition_line(before).equals(line):
-                return value_at(before, self.seepage.duration or 0.0)
-        return None
-
-    def moving_conditions(self, stage: Shaking) -> list[tuple[Any, float | None]]:
-        """Conditions of the water in a shaking stage, and what each prescribed at rest if it held there.
-
-        Where the stage leaves them to those before, these stay as they last were, save on free-field sides.
-        """
-        current = [
-            (condition, self._value_at_rest(condition))
-            for condition in (self.seepage.conditions if self.seepage else ())
-            if not self._is_beside_column(self.condition_line(condition))
-        ]
-        end = self.seepage.duration if self.seepage else None
-        for before in self.stages:
-            if not isinstance(before, Shaking):
-                continue
-            if before.conditions is None:
-                current = [(frozen(condition, end or 0.0), rest) for condition, rest in current]
-            else:
-                current = [(condition, self._value_at_rest(condition)) for condition in before.conditions]
-            if before is stage:
-                break
-            end = self.duration(before)
-        return current
-
-    def _check_condition(self, stage: Seepage | Shaking, condition: Any, path: str) -> None:
-        line = self.condition_line(condition)
-        if isinstance(condition, Drain):
-            if not shapely.buffer(self.section, COORDINATE_TOLERANCE).covers(line):
-                raise InvalidInput(
-                    f"{path}.points",
-                    condition.points,
-                    "must lie in the section",
-                    "water at its edges is told by the other conditions",
-                )
-        elif line.is_empty or line.length <= COORDINATE_TOLERANCE:
-            raise InvalidInput(
-                f"{path}.{'x' if condition.x else 'on'}",
-                condition.x or condition.on,
-                "must cover a stretch of the section's edge",
-                f"the section reaches from x = {self.bounds[0]:g} to {self.bounds[2]:g} m",
-            )
-        elif not isinstance(condition.on, str):
-            self._check_points(condition, f"{path}.on")
-        if isinstance(self.sides, Periodic) and not isinstance(condition, Drain) and self._on_a_side(line):
-            raise InvalidInput(
-                f"{path}.on",
-                condition.on,
-                "does not go with periodic sides, which are no edges",
-                "sides = Roller() or FreeField()",
-            )
-        lowest = self.outline.base[:, 1].min()
-        if (told := heads_of(condition)) is not None:
-            name, values = told
-            for j, (_, value) in enumerate(values):
-                if value < lowest - COORDINATE_TOLERANCE:
-                    place = f"[{j}]" if len(values) > 1 else ""
-                    raise InvalidInput(
-                        f"{path}.{name}{place}",
-                        value,
-                        f"must not lie below the base, elevation {lowest:g} m",
-                        "heads are elevations in the section's own coordinates",
-                    )
-        values = series_of(condition)
-        if isinstance(stage, Seepage) and stage.duration is None and len(values) > 1:
-            raise InvalidInput(
-                f"{path}.{prescribed(condition)}",
-                values,
-                "must not change with time on the way to a steady state",
-                "give the stage a duration, in s",
-            )
-
-    def _on_a_side(self, line: BaseGeometry) -> bool:
-        """Whether a line runs along the left or the right end of the section."""
-        x = line.bounds[0::2]
-        return any(np.allclose(x, end, atol=COORDINATE_TOLERANCE, rtol=0.0) for end in self.bounds[0::2])
-
-    def _check_points(self, condition: Any, path: str) -> None:
-        """The points of a line, and what lies between them, must be on the edge."""
-        away = shapely.distance(shapely.points(condition.on), self.section.exterior)
-        farthest = int(np.argmax(away))
-        hint = "for a line inside the section: Drain"
-        if away[farthest] > self.spacing:
-            raise InvalidInput(
-                f"{path}[{farthest}]",
-                condition.on[farthest],
-                f"must lie on the edge of the section, it is {away[farthest]:.3g} m away",
-                hint,
-            )
-        between = shapely.segmentize(shapely.LineString(condition.on), self.spacing)
-        away = shapely.distance(shapely.points(between.coords), self.section.exterior)
-        if away.max() > self.spacing:
-            raise InvalidInput(
-                path,
-                condition.on,
-                f"must follow the edge of the section, it leaves it by {away.max():.3g} m",
-                hint,
-            )
-
-    def _check_shared_edges(self, stage: Seepage | Shaking, path: str) -> None:
-        """No stretch of edge may obey two conditions."""
-        edges = []
-        for k, condition in enumerate(stage.conditions or ()):
-            if not isinstance(condition, Drain):
-                line = self.condition_line(condition)
-                edges.append((k, condition, line, shapely.buffer(line, COORDINATE_TOLERANCE)))
-        for (k, _, _, reach), (m, other, line, _) in itertools.combinations(edges, 2):
-            common = line.intersection(reach)
-            # Lines that meet share the reach of their ends.
-            if common.length > 4.0 * COORDINATE_TOLERANCE:
-                x0, y0, x1, y1 = common.bounds
-                raise InvalidInput(
-                    f"{path}.conditions[{m}].on",
-                    other.on,
-                    f"must leave out the edge of conditions[{k}], but they share x {x0:g} to {x1:g}, "
-                    f"y {y0:g} to {y1:g}",
-                    "cut it by x = (left, right) or by points",
-                )
-
-    def _lowest_head(self, condition: Any) -> float:
-        """The lowest head that a condition may draw the water down to, m; infinite if it tells none."""
-        if (told := heads_of(condition)) is not None:
-            return min(value for _, value in told[1])
-        bottom = float(self.condition_line(condition).bounds[1])
-        if isinstance(condition, Pressure) and self.water is not None:
-            return bottom + min(value for _, value in condition.pressure) / self.water.unit_weight
-        return bottom if isinstance(condition, SeepageFace | Drain) else float("inf")
-
-    def _is_drowned(self, stage: Seepage) -> bool:
-        """Whether open water stands on all of the ground: a drain then draws through what stays full."""
-        dry = shapely.LineString(self.outline.surface)
-        for condition in stage.conditions:
-            if (told := heads_of(condition)) is not None:
-                line = self.condition_line(condition)
-                if min(value for _, value in told[1]) >= line.bounds[3] - COORDINATE_TOLERANCE:
-                    dry = dry.difference(shapely.buffer(line, COORDINATE_TOLERANCE))
-        return bool(dry.length <= COORDINATE_TOLERANCE)
-
-    def _check_desaturation(self, stage: Seepage, path: str) -> None:
-        """Soil that heads leave above them must say what it holds."""
-        drowned = self._is_drowned(stage)
-        levels = [
-            self._lowest_head(condition)
-            for condition in stage.conditions
-            if not (drowned and isinstance(condition, Drain))
-        ]
-        level = min([*levels, float(self.water_level_at(np.array(self.bounds[0::2])).min())])
-        for i, region in enumerate(self.regions):
-            if region.retention is None and region.geometry.bounds[3] > level + self.spacing:
-                raise InvalidInput(
-                    f"scene.regions[{i}].retention",
-                    None,
-                    f"is required: region {region.name!r} reaches {region.geometry.bounds[3]:g} m, above the "
-                    f"head of {level:g} m",
-                    "VanGenuchten(alpha=7.5, n=1.89) is a sandy loam",
-                )
-
-    def condition_line(self, condition: Any) -> BaseGeometry:
-        """The line on which a hydraulic condition holds."""
-        if isinstance(condition, Drain):
-            return shapely.LineString(condition.points)
-        outline, (x0, _, x1, _) = self.outline, self.bounds
-        if not isinstance(condition.on, str):
-            return shapely.LineString(condition.on)
-        lines = {
-            "surface": outline.surface,
-            "base": outline.base,
-            "left": [(x0, outline.left[0]), (x0, outline.left[1])],
-            "right": [(x1, outline.right[0]), (x1, outline.right[1])],
-        }
-        line = shapely.LineString(lines[condition.on])
-        if condition.x is None:
-            return line
-        y0, y1 = line.bounds[1] - 1.0, line.bounds[3] + 1.0
-        part = shapely.intersection(line, shapely.box(condition.x[0], y0, condition.x[1], y1))
-        return shapely.line_merge(part) if part.geom_type == "MultiLineString" else part
 
     def _check_materials(self) -> None:
         """Let the soil models refuse what only they know, each at a stress that any soil bears."""
@@ -1551,6 +1212,17 @@ class Scene(Model):
         (x0, y0), (x1, y1) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
         return float(x0), float(y0), float(x1), float(y1)
 
+    def condition_line(self, condition: AnyCondition) -> BaseGeometry:
+        """The line on which a hydraulic condition holds."""
+        return line_of(condition, self.outline)
+
+    def moving_conditions(self, stage: Shaking) -> list[tuple[AnyCondition, float | None]]:
+        """Conditions of the water in a shaking stage, and what each prescribed at rest if it held there.
+
+        Where the stage leaves them to those before, these stay as they last were, save on free-field sides.
+        """
+        return _scene_water.moving_conditions(self, stage)
+
     def water_level_at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Elevation of the water table above each x, m; below everything in a dry scene."""
         table = self.water_table
@@ -1583,7 +1255,7 @@ class Scene(Model):
         """Whether some pores hold air at the start, or may come to."""
         if self.water is None:
             return False
-        return bool(self._regions_above_water()) or (
+        return bool(_scene_water.regions_above_water(self)) or (
             self.seepage is not None and any(region.retention for region in self.regions)
         )
 
