@@ -248,16 +248,8 @@ impl Specimen {
 
     /// Work done by the model, by kind, trials that were given up included.
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let report = self.inner.report();
         let dict = PyDict::new(py);
-        for (name, value) in [
-            ("substeps", report.substeps),
-            ("evaluations", report.evaluations),
-            ("pressure_floors", report.pressure_floors),
-            ("forced_acceptances", report.forced_acceptances),
-            ("reversals", report.reversals),
-            ("near_neutral_reversals", report.near_neutral_reversals),
-        ] {
+        for (name, value) in self.inner.report().named() {
             dict.set_item(name, value)?;
         }
         Ok(dict)

@@ -521,15 +521,13 @@ pub fn counted<'py>(py: Python<'py>, counters: &solver::Counters) -> PyResult<Bo
         ("plastic_updates", counters.plastic_updates),
         ("geometry_builds", counters.geometry_builds),
         ("porosity_clips", counters.porosity_clips),
+        ("inadmissible_starts", counters.inadmissible_starts),
         ("time_step_changes", counters.time_step_changes),
         ("edge_contacts", counters.edge_contacts),
-        ("substeps", counters.soil.substeps),
-        ("evaluations", counters.soil.evaluations),
-        ("pressure_floors", counters.soil.pressure_floors),
-        ("forced_acceptances", counters.soil.forced_acceptances),
-        ("reversals", counters.soil.reversals),
-        ("near_neutral_reversals", counters.soil.near_neutral_reversals),
-    ] {
+    ]
+    .into_iter()
+    .chain(counters.soil.named())
+    {
         dict.set_item(name, value)?;
     }
     Ok(dict)

@@ -176,7 +176,7 @@ impl DruckerPrager {
 
     /// State after the return of a trial stress whose first invariant falls by `fall` per unit of plastic shear
     /// strain.
-    fn returned(&self, trial: Stress, before: f64, fall: f64) -> State {
+    fn returned(&self, trial: Stress, before: f64, fall: f64, report: &mut UpdateReport) -> State {
         let (size, first_invariant) = (trial.root_j2(), trial.first_invariant());
         let plastic = self.plastic_shear(size, first_invariant, before, fall);
         if plastic == 0.0 && first_invariant <= self.largest_invariant {
@@ -196,9 +196,11 @@ impl DruckerPrager {
             let plastic = self.plastic_shear(size, self.largest_invariant, before, 0.0);
             let admissible = self.cone(before + plastic).size_at(self.largest_invariant);
             if admissible >= 0.0 {
+                report.tension_cutoffs += 1;
                 return state(plastic, self.largest_invariant, admissible);
             }
         }
+        report.apex_returns += 1;
         let plastic = size / self.elastic.constants().shear;
         state(plastic, self.cone(before + plastic).apex(), 0.0)
     }
@@ -234,10 +236,11 @@ impl SoilModel for DruckerPrager {
         de.bounded()?;
         let trial = self.elastic.moved(&state.stress, de);
         let fall = 9.0 * self.elastic.constants().bulk * self.cone(state.plastic_shear).dilation;
-        let next = self.returned(trial, state.plastic_shear, fall);
+        let mut report = UpdateReport::default();
+        let next = self.returned(trial, state.plastic_shear, fall, &mut report);
         next.stress.finite("stress")?;
         *state = next;
-        Ok(UpdateReport::default())
+        Ok(report)
     }
 
     fn stress(&self, state: &State) -> Stress {
@@ -319,7 +322,8 @@ mod tests {
                     let size = now.size_at(3.0 * mean).max(0.0) + excess;
                     let trial = Stress { xx: mean, yy: mean, xy: size, zz: mean };
                     let fall = 9.0 * bulk * now.dilation;
-                    let State { stress, plastic_shear } = soil.returned(trial, before, fall);
+                    let State { stress, plastic_shear } =
+                        soil.returned(trial, before, fall, &mut UpdateReport::default());
                     let plastic = plastic_shear - before;
                     let (left, volume) = (stress.root_j2(), stress.first_invariant());
                     let context = format!("{before} {mean} {excess}: {stress:?} {plastic}");

@@ -45,8 +45,13 @@ impl MohrCoulomb {
         (smallest * (1.0 - self.sin_phi) + self.cohesion) / (1.0 + self.sin_phi)
     }
 
+    /// Mean stress of the apex, kPa; infinite without friction.
+    fn apex(&self) -> f64 {
+        self.cohesion / (2.0 * self.sin_phi)
+    }
+
     /// Principal stresses after the return of ordered trial ones, with the flow of a dilation angle.
-    fn admissible(&self, trial: Principal, sin_psi: f64) -> Principal {
+    fn admissible(&self, trial: Principal, sin_psi: f64, report: &mut UpdateReport) -> Principal {
         let [s1, s2, s3] = trial;
         let excess = self.excess(s1, s3);
         if excess <= 0.0 {
@@ -91,12 +96,13 @@ impl MohrCoulomb {
                 return [largest, largest, smallest];
             }
         }
-        [self.cohesion / (2.0 * self.sin_phi); 3]
+        report.apex_returns += 1;
+        [self.apex(); 3]
     }
 
     /// Stress after the return of a trial one. Tension above the cut-off is then cut from each principal stress by
     /// itself.
-    fn returned(&self, trial: &Stress, sin_psi: f64) -> Stress {
+    fn returned(&self, trial: &Stress, sin_psi: f64, report: &mut UpdateReport) -> Stress {
         let (mean, radius, zz) = (trial.plane_mean(), trial.radius(), trial.zz);
         let (upper, lower) = (mean + radius, mean - radius);
         // Where the out-of-plane stress stands among the three.
@@ -112,7 +118,13 @@ impl MohrCoulomb {
             1 => [upper, zz, lower],
             _ => [upper, lower, zz],
         };
-        let admitted = self.admissible(ordered, sin_psi).map(|stress| stress.min(self.tension));
+        let on_surface = self.admissible(ordered, sin_psi, report);
+        let admitted = on_surface.map(|stress| stress.min(self.tension));
+        // Without a cut-off, `tension` is the apex, and takes round-off alone.
+        if self.tension < self.apex() && admitted != on_surface {
+            // Not also the apex, from where it was cut.
+            *report = UpdateReport { tension_cutoffs: 1, ..UpdateReport::default() };
+        }
         if admitted == ordered {
             return *trial;
         }
@@ -131,7 +143,8 @@ impl SoilModel for MohrCoulomb {
 
     /// A stress outside keeps its mean, or the largest one admitted, and loses the shear that is too much.
     fn initialise(&self, stress: Stress, _void_ratio: Option<f64>) -> Result<Stress, SoilError> {
-        self.returned(&stress.finite("initial stress")?, 0.0).finite("initial stress")
+        self.returned(&stress.finite("initial stress")?, 0.0, &mut UpdateReport::default())
+            .finite("initial stress")
     }
 
     fn update(
@@ -142,8 +155,9 @@ impl SoilModel for MohrCoulomb {
     ) -> Result<UpdateReport, SoilError> {
         de.bounded()?;
         let trial = self.elastic.moved(state, de);
-        *state = self.returned(&trial, self.sin_psi).finite("stress")?;
-        Ok(UpdateReport::default())
+        let mut report = UpdateReport::default();
+        *state = self.returned(&trial, self.sin_psi, &mut report).finite("stress")?;
+        Ok(report)
     }
 
     fn stress(&self, state: &Stress) -> Stress {
@@ -159,6 +173,6 @@ impl SoilModel for MohrCoulomb {
     }
 
     fn carries(&self, stress: &Stress) -> bool {
-        self.returned(stress, 0.0) == *stress
+        self.returned(stress, 0.0, &mut UpdateReport::default()) == *stress
     }
 }

@@ -7,6 +7,12 @@ pub struct UpdateReport {
     pub evaluations: u64,
     /// Committed parts that ended at the pressure floor.
     pub pressure_floors: u64,
+    /// Committed parts whose stress was taken back to the bounding surface.
+    pub bounding_caps: u64,
+    /// Updates that ended at a cut-off of tension.
+    pub tension_cutoffs: u64,
+    /// Updates that ended at the apex of a strength surface.
+    pub apex_returns: u64,
     /// Sub-steps accepted at the smallest size although their error was above the tolerance.
     pub forced_acceptances: u64,
     /// Load reversals.
@@ -21,9 +27,27 @@ impl UpdateReport {
         self.substeps += other.substeps;
         self.evaluations += other.evaluations;
         self.pressure_floors += other.pressure_floors;
+        self.bounding_caps += other.bounding_caps;
+        self.tension_cutoffs += other.tension_cutoffs;
+        self.apex_returns += other.apex_returns;
         self.forced_acceptances += other.forced_acceptances;
         self.reversals += other.reversals;
         self.near_neutral_reversals += other.near_neutral_reversals;
+    }
+
+    /// Every count by its name.
+    pub fn named(&self) -> [(&'static str, u64); 9] {
+        [
+            ("substeps", self.substeps),
+            ("evaluations", self.evaluations),
+            ("pressure_floors", self.pressure_floors),
+            ("bounding_caps", self.bounding_caps),
+            ("tension_cutoffs", self.tension_cutoffs),
+            ("apex_returns", self.apex_returns),
+            ("forced_acceptances", self.forced_acceptances),
+            ("reversals", self.reversals),
+            ("near_neutral_reversals", self.near_neutral_reversals),
+        ]
     }
 }
 

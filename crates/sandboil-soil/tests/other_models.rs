@@ -954,3 +954,38 @@ fn impossible_strengths_are_refused() {
         refused(Parameters { softening, ..cone(sound, Matching::Usual) }, which);
     }
 }
+
+/// One update for each place where tension ends: inside nothing is counted, on the cone or a plane neither.
+#[test]
+fn ends_at_an_apex_or_a_cut_off_are_counted() {
+    let peak = strength(14.4, 31.0, 10.0);
+    let apex = 14.4 / 31.0_f64.to_radians().tan();
+    let counted = |soil: &Soil, pressure: f64, de: &StrainIncrement| {
+        let report = with_model!(soil, model => {
+            let mut state = model.initialise(isotropic(pressure), None).unwrap();
+            model.update(&mut state, de, &Integrator::default()).unwrap()
+        });
+        let counts = (report.tension_cutoffs, report.apex_returns);
+        assert_eq!(report.named().iter().map(|(_, count)| count).sum::<u64>(), counts.0 + counts.1);
+        counts
+    };
+    let tension = strain_of(0.01, 0.01, 0.0);
+    for (tension_cutoff, in_tension) in
+        [(None, (0, 1)), (Some(0.99 * apex), (1, 0)), (Some(3.0), (1, 0)), (Some(0.0), (1, 0))]
+    {
+        let parameters = Parameters { tension_cutoff, ..cone(peak, Matching::General) };
+        let cone = Soil::DruckerPrager(DruckerPrager::new(skeleton(), parameters).unwrap());
+        let pyramid = Soil::MohrCoulomb(MohrCoulomb::new(skeleton(), peak, tension_cutoff).unwrap());
+        for soil in [cone, pyramid] {
+            assert_eq!(counted(&soil, 100.0, &strain_of(1e-6, 1e-6, 1e-6)), (0, 0), "{soil:?}");
+            assert_eq!(counted(&soil, 100.0, &strain_of(-1e-4, 0.0, 0.01)), (0, 0), "{soil:?}");
+            assert_eq!(counted(&soil, 20.0, &tension), in_tension, "{soil:?}");
+        }
+    }
+    // Without friction there is no apex, and no tension is too much.
+    let clay = strength(20.0, 0.0, 0.0);
+    let cone = Soil::DruckerPrager(drucker_prager(clay, Matching::Usual));
+    for soil in [cone, Soil::MohrCoulomb(pyramid(clay))] {
+        assert_eq!(counted(&soil, 20.0, &tension), (0, 0), "{soil:?}");
+    }
+}

@@ -584,3 +584,17 @@ fn order_of_convergence_on_first_loading() {
     assert!(euler.into_iter().all(|order| order > 1.9), "{euler:?}");
     assert!(runge_kutta.into_iter().all(|order| order > 3.0), "{runge_kutta:?}");
 }
+
+/// Dense sand that is sheared until it slides meets its bounding surface, which is counted; before, it does not.
+#[test]
+fn stresses_taken_back_to_the_bounding_surface_are_counted() {
+    let sand = sand(CALIBRATIONS[2]);
+    let mut state = consolidated(&sand);
+    let mut sheared = |steps: u32| {
+        (0..steps)
+            .map(|_| advance(&sand, &mut state, &shear(1e-5), &Integrator::default()).bounding_caps)
+            .sum::<u64>()
+    };
+    assert_eq!(sheared(100), 0);
+    assert!(sheared(10_000) > 0);
+}

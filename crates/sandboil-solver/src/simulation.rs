@@ -116,6 +116,8 @@ pub struct Counters {
     pub geometry_builds: u64,
     /// Porosities kept in the range of a grain packing.
     pub porosity_clips: u64,
+    /// Stress nodes that began with a stress their soil cannot carry, and took the nearest that it can.
+    pub inadmissible_starts: u64,
     /// Changes of the time step.
     pub time_step_changes: u64,
     /// Times that a node of flowing ground was stopped at an edge.
@@ -410,6 +412,7 @@ impl Simulation {
             self.velocity.fill(Vec2::zeros());
             self.acceleration.fill(Vec2::zeros());
             self.soil = SoilField::plastic(&self.model, &mut self.points, None)?;
+            self.counters.inadmissible_starts = self.soil.inadmissible_starts();
             self.contacts = corrected.then(|| Contacts::new(&self.model, &self.points));
             self.sharpen_contacts();
         }

@@ -103,6 +103,8 @@ struct Outcome {
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct SoilField {
     groups: Vec<Group>,
+    /// Stress nodes whose soil could not carry the stress they began with.
+    inadmissible_starts: u64,
     /// Of the chunks of the longest group, in a step. A field that was restored has none before its first step.
     #[serde(skip)]
     outcomes: Vec<Outcome>,
@@ -259,17 +261,21 @@ impl SoilField {
         points: &mut [StressPoint],
         void_ratio: Option<f64>,
     ) -> Result<Self, SolverError> {
-        Self::build(model, |region, rows| {
+        let mut inadmissible_starts = 0;
+        let field = Self::build(model, |region, rows| {
             let soil = &model.regions[region].soil;
             let Soil::Elastic(elastic) = soil else {
-                let rows = with_model!(soil, law => plastic_rows(law, region, rows, points, void_ratio)?);
+                let (rows, replaced) =
+                    with_model!(soil, law => plastic_rows(law, region, rows, points, void_ratio)?);
+                inadmissible_starts += replaced;
                 return Ok(Law::Plastic(soil.clone(), rows));
             };
             for point in &mut points[rows] {
                 set_moduli(point, elastic.constants());
             }
             Ok(Law::Elastic(*elastic))
-        })
+        })?;
+        Ok(Self { inadmissible_starts, ..field })
     }
 
     fn build(
@@ -282,7 +288,7 @@ impl SoilField {
             .collect::<Result<Vec<_>, SolverError>>()?;
         let longest = groups.iter().map(|group| group.rows.len()).max().unwrap_or(0);
         let outcomes = vec![Outcome::default(); chunks(longest)];
-        Ok(Self { groups, outcomes, largest_step: LARGEST_STEP })
+        Ok(Self { groups, inadmissible_starts: 0, outcomes, largest_step: LARGEST_STEP })
     }
 
     /// Lets the soil flow.
@@ -368,6 +374,11 @@ impl SoilField {
         })
     }
 
+    /// Stress nodes whose soil could not carry the stress they began with, and took the nearest that it can.
+    pub fn inadmissible_starts(&self) -> u64 {
+        self.inadmissible_starts
+    }
+
     /// Stress nodes that run a plastic model.
     pub fn plastic_points(&self) -> usize {
         self.plastic_groups().map(Plastic::points).sum()
@@ -379,16 +390,19 @@ impl SoilField {
     }
 }
 
-/// States of one region's rows, and the stress and stiffness they give their points.
+/// States of one region's rows, and the stress and stiffness they give their points; and how many of them could not
+/// carry their stress.
 fn plastic_rows<M: SoilModel + 'static>(
     law: &M,
     region: usize,
     rows: Range<usize>,
     points: &mut [StressPoint],
     void_ratio: Option<f64>,
-) -> Result<Box<dyn Plastic>, SolverError> {
+) -> Result<(Box<dyn Plastic>, u64), SolverError> {
     let mut states = Vec::with_capacity(rows.len());
+    let mut replaced = 0;
     for s in rows {
+        replaced += u64::from(!law.carries(&points[s].stress));
         let state = law.initialise(points[s].stress, void_ratio).map_err(|source| SolverError::Soil {
             region,
             node: s / STRESS_NODES,
@@ -398,7 +412,7 @@ fn plastic_rows<M: SoilModel + 'static>(
         set_moduli(&mut points[s], law.moduli(&state));
         states.push(state);
     }
-    Ok(Box::new(Rowed { model: law.clone(), states }))
+    Ok((Box::new(Rowed { model: law.clone(), states }), replaced))
 }
 
 fn restored_rows<M: SoilModel + 'static>(law: &M, states: &[u8]) -> postcard::Result<Box<dyn Plastic>> {

@@ -132,15 +132,16 @@ impl PM4Sand {
             }
         }
         state.volumetric_strain += strain.volume;
-        self.commit(state, before.fabric);
+        self.commit(state, before.fabric, report);
     }
 
     /// End of a part (Chen and Arduino 2021): moduli, cap at the bounding surface, cumulative fabric.
-    fn commit(&self, state: &mut State, fabric_before: Deviator) {
+    fn commit(&self, state: &mut State, fabric_before: Deviator, report: &mut UpdateReport) {
         state.moduli = self.committed_moduli(state);
         let p = state.mean.max(state.p_min);
         let ratio = stress_ratio(p, state.deviator);
         if ratio > state.bounding_ratio {
+            report.bounding_caps += 1;
             state.deviator = state.deviator * (state.bounding_ratio / ratio);
             // Below `p_min` the stress keeps a larger ratio than the formulas see; the yield surface has to reach it.
             let kept = state.bounding_ratio * (p / state.mean);

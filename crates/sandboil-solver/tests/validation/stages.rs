@@ -2,7 +2,9 @@
 
 use crate::common::{column, elastic, shaking};
 use sandboil_soil::{
-    Soil,
+    Soil, Strength,
+    elastic::Elastic,
+    mohr_coulomb::MohrCoulomb,
     pm4sand::{Options, PM4Sand, Parameters},
 };
 use sandboil_solver::{
@@ -231,5 +233,23 @@ fn a_wide_section_of_low_permeability_calms_down() {
             println!("k {conductivity} m/s, h/dx {smoothing_ratio}: {largest:.1e} m/s left of {NOISE}");
             assert!(largest < 0.2 * NOISE, "{largest}");
         }
+    }
+}
+
+/// Frictional ground at rest with a horizontal stress too small for it: the soil of shaking takes the nearest stress that
+/// it carries at every stress node, and says how often.
+#[test]
+fn stresses_at_rest_that_the_soil_cannot_carry_are_counted() {
+    for (phi, share) in [(35.0, 0.0), (10.0, 1.0)] {
+        let mut region = elastic(1e4, 2e4);
+        let strength = Strength { c: 0.0, phi, psi: 0.0 };
+        let skeleton = Elastic::new(1e4, 2e4).unwrap();
+        region.soil = Soil::MohrCoulomb(MohrCoulomb::new(skeleton, strength, None).unwrap());
+        let model = column(HEIGHT, SPACING, 1, region, None);
+        let mut simulation = at_rest(&model);
+        assert_eq!(simulation.counters().inadmissible_starts, 0);
+        simulation.begin_shaking(shaking(None, 1.0, Vec::new())).unwrap();
+        let stress_nodes = 2.0 * model.position.len() as f64;
+        assert_eq!(simulation.counters().inadmissible_starts as f64, share * stress_nodes, "{phi}");
     }
 }
