@@ -8,7 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 import scenes
-from sandboil import Gravity, InvalidInput, Motion, Region, Run, Shaking, box, run
+from sandboil import (
+    Elastic,
+    FreeField,
+    Gravity,
+    InvalidInput,
+    Motion,
+    Output,
+    Rayleigh,
+    Region,
+    Run,
+    Shaking,
+    Water,
+    box,
+    polygon,
+    run,
+)
 from sandboil.simulation import ENERGY
 
 # What damping takes without filter and Rayleigh damping, over what came in at most: the error of the balance.
@@ -68,6 +83,58 @@ def test_grains_keep_their_mass(finished: Run) -> None:
     assert (energy["solid_mass"] == energy["solid_mass"][0]).all()
     # Gravity has strained the ground by less than a millionth.
     assert energy["water_mass"][0] == pytest.approx(sum(porosities) * 10.0 / 9.81, rel=1e-6)
+
+
+HILL = [(0, 0), (16, 0), (16, 4), (10, 4), (9, 6), (7, 6), (6, 4), (0, 4)]
+SOFT = Elastic(E=5.0e4, nu=0.3)
+CONTACT = [
+    Region("rock", box(x=(0, 4), y=(0, 4)), scenes.ROCK, dry_unit_weight=20.0),
+    Region("soft", box(x=(4, 8), y=(0, 4)), SOFT, dry_unit_weight=18.0),
+]
+
+
+@pytest.mark.parametrize(
+    "regions",
+    [[Region("hill", polygon(HILL), scenes.ROCK, dry_unit_weight=20.0)], CONTACT],
+    ids=["hill", "contact"],
+)
+def test_free_field_sides_bring_what_the_balance_lacks(regions: list[Region], tmp_path: Path) -> None:
+    stages = [Gravity(), Shaking(SHORT_PULSE, duration=0.8)]
+    said = unfiltered(spacing=0.5, regions=regions, sides=FreeField(), stages=stages, output=Output())
+    energy = run(scenes.dry_column(**said), tmp_path).energy()
+    brought = energy["base"].max()
+    assert np.abs(energy["sides"]).max() > 0.1 * brought
+    assert np.abs(energy["damping"]).max() < CLOSURE * brought
+
+
+def test_masses_that_a_renewal_changes_are_accounted(tmp_path: Path) -> None:
+    """Undrained elastic ground with air in its water, which a vertical motion presses out of it and in."""
+    ground = Region("soft", box(x=(0, 0.5), y=(0, 4)), Elastic(E=1.0e4, nu=0.3), Gs=2.67, porosity=0.4)
+    stages = [Gravity(), Shaking(scenes.PULSE, vertical=scenes.PULSE, duration=0.8)]
+    numerics = {"velocity_filter": 0.0, "geometry_strain_limit": 1.0e-4}
+    scene = scenes.column(water=Water(bulk_modulus=1.0e4), regions=[ground], stages=stages, numerics=numerics)
+    energy = run(scene, tmp_path).energy()
+    brought = energy["base"].max()
+    assert np.abs(energy["renewal"]).max() > 50.0 * CLOSURE * brought
+    assert np.abs(energy["damping"]).max() < CLOSURE * brought
+
+
+def test_rayleigh_damping_takes_what_a_pulse_loses_on_its_way(tmp_path: Path) -> None:
+    """A wave of w fades as exp(-xi w t), with 2 xi w = a + b w^2, on its way up and down."""
+    damping = Rayleigh(ratio=0.02, frequencies=(2.0, 16.0))
+    stages = [Gravity(), Shaking(SHORT_PULSE, duration=1.2, rayleigh=damping)]
+    energy = run(scenes.dry_column(**unfiltered(spacing=0.5, regions=TALL, stages=stages)), tmp_path).energy()
+    dt, velocity = SHORT_PULSE.upgoing_velocity()
+    way = 2.0 * 40.0 / np.sqrt(scenes.ROCK.shear_modulus * 9.81 / 20.0)
+    low, high = (2.0 * np.pi * frequency for frequency in damping.frequencies)
+    drag, viscosity = (2.0 * damping.ratio * factor / (low + high) for factor in (low * high, 1.0))
+    power = np.abs(np.fft.rfft(velocity)) ** 2
+    frequency = 2.0 * np.pi * np.fft.rfftfreq(len(velocity), dt)
+    left = float(np.sum(power * np.exp(-(drag + viscosity * frequency**2) * way)) / np.sum(power))
+    brought = 0.5 * np.sqrt(scenes.ROCK.shear_modulus * 20.0 / 9.81) * float(np.sum(velocity**2)) * dt
+    assert left < 0.7
+    assert energy["damping"][-1] == pytest.approx((1.0 - left) * brought, rel=0.02)
+    assert np.diff(energy["damping"]).min() > -CLOSURE * brought
 
 
 def test_local_damping_is_told_apart(tmp_path: Path) -> None:

@@ -4,6 +4,9 @@
 //! are exactly what kinetic energy gains. Stress does its work at the stress nodes, half of every strain increment with
 //! the stress before it and half with the one after: summed by parts that is the work of its nodal forces, to the second
 //! order in the strain of a step. What the skeleton's forces take beyond it is what damping takes.
+//!
+//! A step costs no loop of its own: constant forces and water do half their work where the next step reads the velocity
+//! between both, and motion is looked at where a sample is taken.
 
 use crate::{phases::Phases, soil_field::StressWork};
 
@@ -25,14 +28,11 @@ pub const ENERGY_NAMES: [&str; 11] = [
 /// Energy of a section in a stage of shaking, kJ/m; works count from its beginning.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Energy {
-    /// Of the motion in the middle of the last step.
-    kinetic: f64,
-    /// Taken by forces of stress, velocity filter and Rayleigh damping.
-    skeleton: f64,
-    /// Done on the soil by its effective stress; what it stores and what its plasticity takes.
+    /// Of the motion at the beginning.
+    kinetic_before: f64,
+    /// Done on the soil by its effective stress, all of the last strain increment included; what it stores and what its
+    /// plasticity takes.
     stress: f64,
-    /// The same of the last strain increment with the stress after it: half of it belongs to the next step.
-    unmet: f64,
     /// Given to the pore water beyond its state at rest.
     water: f64,
     /// Taken by local damping.
@@ -41,24 +41,29 @@ pub struct Energy {
     constant: f64,
     /// Brought in by the base's dashpots.
     base: f64,
-    /// Brought in by free-field sides.
+    /// Brought in by free-field sides, also through the strain that the columns' motion gives.
     sides: f64,
     /// Kinetic energy gained by masses that a renewed geometry has changed.
     renewal: f64,
+    /// Length of the last step while constant forces and water still owe it half their work, s; else zero.
+    owed: f64,
 }
 
-/// What a step did to a section, kJ/m: each force on the mean of the velocities before and after it.
+/// Power of nodal forces on a velocity field, kW/m.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct StepWork {
-    /// Kinetic energy that it leaves.
-    pub kinetic: f64,
-    /// Work of gravity and of the reactions stored at rest.
+pub struct Power {
+    /// Of gravity and of the reactions stored at rest.
     pub constant: f64,
-    /// Work of the pore water on the soil.
+    /// Of the pore water on the soil.
     pub water: f64,
-    /// Work of the base's dashpots.
+}
+
+/// Work of a step, kJ/m: each force on the mean of the velocities before and after it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct EdgeWork {
+    /// Of the base's dashpots.
     pub base: f64,
-    /// Work of free-field sides.
+    /// Of free-field sides.
     pub sides: f64,
     /// What local damping takes.
     pub local_damping: f64,
@@ -67,40 +72,53 @@ pub struct StepWork {
 impl Energy {
     /// Nothing done yet at a kinetic energy, kJ/m.
     pub fn new(kinetic: f64) -> Self {
-        Self { kinetic, ..Self::default() }
+        Self { kinetic_before: kinetic, ..Self::default() }
     }
 
-    /// Takes over what a step did.
-    pub fn step(&mut self, work: &StepWork) {
-        let StepWork { kinetic, constant, water, base, sides, local_damping } = *work;
-        self.skeleton += constant + water + base + sides - local_damping - (kinetic - self.kinetic);
-        self.kinetic = kinetic;
-        self.constant += constant;
-        self.water -= water;
-        self.base += base;
-        self.sides += sides;
-        self.local_damping += local_damping;
+    /// Takes over the power of the last step's forces on the velocity that it left: the half of its work still owed.
+    pub fn end_step(&mut self, last: Power) {
+        self.constant += 0.5 * self.owed * last.constant;
+        self.water -= 0.5 * self.owed * last.water;
+        self.owed = 0.0;
     }
 
-    /// Takes over the kinetic energy after a renewal of the geometry, kJ/m.
-    pub fn renew(&mut self, kinetic: f64) {
-        self.renewal += kinetic - self.kinetic;
-        self.kinetic = kinetic;
+    /// Takes over the power of a step's forces on the velocity that it meets; half of its work, over `dt` in s.
+    pub fn begin_step(&mut self, dt: f64, power: Power) {
+        self.constant += 0.5 * dt * power.constant;
+        self.water -= 0.5 * dt * power.water;
+        self.owed = dt;
+    }
+
+    /// Takes over what edges and local damping did in a step.
+    pub fn step(&mut self, work: &EdgeWork) {
+        self.base += work.base;
+        self.sides += work.sides;
+        self.local_damping += work.local_damping;
+    }
+
+    /// Takes over the kinetic energy that a renewal of the geometry gave, kJ/m.
+    pub fn renew(&mut self, gained: f64) {
+        self.renewal += gained;
     }
 
     /// Takes over the work of stress in a step's strain, kJ/m.
     pub fn strain(&mut self, work: StressWork) {
-        self.stress += 0.5 * (self.unmet + work.before);
-        self.unmet = work.after;
+        self.stress += work.mean;
     }
 
-    /// The columns of [`ENERGY_NAMES`] but the masses.
-    fn columns(&self) -> [f64; 9] {
+    /// The columns of [`ENERGY_NAMES`] but the masses, from the kinetic energy and the work of the stress `after` the last
+    /// strain increment in it, kJ/m. What the forces of stress, velocity filter and Rayleigh damping have taken is what is
+    /// not found elsewhere.
+    fn columns(&self, kinetic: f64, after: f64) -> [f64; 9] {
+        // Half of the last increment, with the stress after it, belongs to the next step's force.
+        let stress = self.stress - 0.5 * after;
+        let given = self.constant + self.base + self.sides + self.renewal;
+        let held = (kinetic - self.kinetic_before) + self.water + self.local_damping;
         [
-            self.kinetic,
-            self.stress,
+            kinetic,
+            stress,
             self.water,
-            self.skeleton - self.stress,
+            given - held - stress,
             self.local_damping,
             self.constant,
             self.base,
@@ -125,16 +143,20 @@ impl EnergyHistory {
         Self { interval, next: 0, times: Vec::new(), values: Vec::new() }
     }
 
-    /// Offers the state at the end of a step, `time` in s; the last one of a stage is always kept.
-    pub fn offer(&mut self, time: f64, is_last: bool, energy: &Energy, phases: &Phases) {
-        if is_last || time >= self.next as f64 * self.interval {
-            while self.next as f64 * self.interval <= time {
-                self.next += 1;
-            }
-            self.times.push(time);
-            self.values.extend(energy.columns());
-            self.values.extend(phases.total_masses());
+    /// Whether a sample is due at the end of a step, `time` in s.
+    pub fn is_due(&self, time: f64) -> bool {
+        time >= self.next as f64 * self.interval
+    }
+
+    /// Takes a sample at the end of a step, `time` in s, from the kinetic energy and the work of the stress `after` the step
+    /// in its strain, kJ/m.
+    pub fn push(&mut self, time: f64, energy: &Energy, kinetic: f64, after: f64, phases: &Phases) {
+        while self.is_due(time) {
+            self.next += 1;
         }
+        self.times.push(time);
+        self.values.extend(energy.columns(kinetic, after));
+        self.values.extend(phases.total_masses());
     }
 
     /// Takes the samples out: times (s) and values, one row of [`ENERGY_NAMES`] for each time.

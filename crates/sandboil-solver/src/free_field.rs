@@ -16,6 +16,7 @@ use crate::{
     model::{Model, Operators, STRESS_NODES},
     phases::Phases,
     simulation::{Gravity, Shaking, Simulation},
+    skeleton::StressPoint,
 };
 use sandboil_sph::{Csr, LeastSquaresFit, NeighbourList, Period, Vec2, WendlandQuintic};
 use std::collections::BTreeMap;
@@ -50,6 +51,8 @@ struct TiedSide {
     targets: Vec<f64>,
     /// Force of the step on the nodes of the tables, kN/m.
     force: Vec<Vec2>,
+    /// Stress nodes that see the column's motion.
+    strained: Vec<usize>,
 }
 
 /// Weights of the column's stress, pressure and base traction in the force on nodes near a side.
@@ -133,6 +136,7 @@ impl FreeField {
                 reference_water: Vec::new(),
                 targets: Vec::new(),
                 force: Vec::new(),
+                strained: Vec::new(),
             });
         }
         if free_field.columns.is_empty() {
@@ -212,6 +216,7 @@ impl FreeField {
         for side in &mut self.sides {
             let (strain, divergence) =
                 (std::mem::take(&mut side.tables.strain), std::mem::take(&mut side.tables.divergence));
+            side.strained = strain.keys().copied().collect();
             geometry.see_guests(renumbered(strain, first), renumbered(divergence, first));
             first += id(self.columns[side.column].rows());
         }
@@ -277,17 +282,25 @@ impl FreeField {
             side.dashpots.begin_step(velocity);
         }
         for (k, column) in self.columns.iter_mut().enumerate() {
-            let told = |error| match self.sides.iter().find(|side| side.column == k) {
-                Some(side) => on_side(side.hand, side.x, error),
-                None => error,
-            };
-            column.step(dt).map_err(told)?;
+            column.step(dt).map_err(|error| of_column(&self.sides, k, error))?;
         }
         for side in &mut self.sides {
             let traction = self.columns[side.column].present().base_traction;
             for (force, length) in side.force.iter_mut().zip(&side.tables.base) {
                 *force += traction * *length;
             }
+        }
+        Ok(())
+    }
+
+    /// Refuses columns whose motion or pore pressure is no longer finite, or that run away.
+    ///
+    /// # Errors
+    /// [`SolverError::Column`] with the first one and its node.
+    pub fn guard(&self) -> Result<(), SolverError> {
+        for (k, column) in self.columns.iter().enumerate() {
+            let Some(simulation) = column.simulation() else { continue };
+            simulation.guard().map_err(|error| of_column(&self.sides, k, error))?;
         }
         Ok(())
     }
@@ -320,6 +333,31 @@ impl FreeField {
         }
     }
 
+    /// Energy that a step brings in, kJ/m: the work of pushes and dashpots, and that of the section's stress in the strain
+    /// that the velocities lent give it, from which no force comes back. Velocities (m/s) have had all their forces,
+    /// accelerations (m/s2) are those of the step, stress is that at its beginning.
+    pub fn work(
+        &self,
+        dt: f64,
+        (velocity, acceleration): (&[Vec2], &[Vec2]),
+        (geometry, points): (&Geometry, &[StressPoint]),
+    ) -> f64 {
+        let path = |node: usize| (velocity[node] - acceleration[node] * (0.5 * dt)) * dt;
+        let lent = velocity.len() - self.guests();
+        let strained = |&s: &usize| {
+            let StressPoint { stress, volume, deformation, .. } = &points[s];
+            let nominal = deformation.cofactor().nominal(stress);
+            let guests = geometry.wall.forward.iter_row(s).filter(|(column, _)| *column >= lent);
+            guests.map(|(column, weight)| weight.contract(nominal).dot(&path(column)) * volume).sum::<f64>()
+        };
+        let of_side = |side: &TiedSide| {
+            let pushed: f64 =
+                side.tables.nodes.iter().zip(&side.force).map(|(&node, force)| force.dot(&path(node))).sum();
+            pushed + side.dashpots.work(dt, velocity) + side.strained.iter().map(strained).sum::<f64>()
+        };
+        self.sides.iter().map(of_side).sum()
+    }
+
     /// Bytes held, columns included.
     pub fn bytes(&self) -> usize {
         let side = |side: &TiedSide| {
@@ -344,6 +382,14 @@ fn renumbered<T>(mut rows: BTreeMap<usize, Vec<(u32, T)>>, first: u32) -> BTreeM
         *column += first;
     }
     rows
+}
+
+/// An error of a column, told with the first side that it belongs to.
+fn of_column(sides: &[TiedSide], column: usize, error: SolverError) -> SolverError {
+    match sides.iter().find(|side| side.column == column) {
+        Some(side) => on_side(side.hand, side.x, error),
+        None => error,
+    }
 }
 
 /// An error of the column at a side, told with its place.

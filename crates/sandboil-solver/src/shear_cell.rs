@@ -449,7 +449,7 @@ impl ShearCell {
             &self.velocity,
             (&mut self.points, &mut self.shares),
             (filter, dt),
-            &self.test.numerics.integrator,
+            (&self.test.numerics.integrator, false),
         );
         let (report, _) = report.map_err(|error| match error.soil_divergence() {
             Some((quantity, node, value)) => self.diverged(quantity, node, value),

@@ -8,7 +8,7 @@ use crate::{
     contacts::Contacts,
     deformation::Deformation,
     dispersion::{Dispersion, lumped_masses},
-    energy::{Energy, EnergyHistory, StepWork},
+    energy::{EdgeWork, Energy, EnergyHistory, Power},
     error::SolverError,
     flow::{Flow, FlowScheme, Ground},
     free_field::{FreeField, Section},
@@ -143,22 +143,22 @@ struct ActiveShaking {
     recorder: Recorder,
     energy: Energy,
     energy_history: EnergyHistory,
-    /// Accelerations that the free-field sides give in a step, m/s2; none without them.
-    side_push: Vec<Vec2>,
     channel_values: Vec<f64>,
     pressure_envelope: Option<Vec<f64>>,
     strain_envelope: Option<Vec<f64>>,
 }
 
-/// Result of one chunk of the velocity update.
+/// Result of one chunk of the velocity update: how far from rest statics are, or what forces do to moving ground.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct MotionSum {
     kinetic_energy: f64,
-    /// Work of the constant forces and of the water's, kJ/m.
-    constant_work: f64,
-    water_work: f64,
     acceleration: f64,
     largest_acceleration: f64,
+    /// Power of the constant forces, and of the water's in this step and in the one before, on the velocity between both,
+    /// kW/m.
+    constant_power: f64,
+    water_power: f64,
+    last_water_power: f64,
 }
 
 /// A section and its state. Every array that leaves is in the user's node order.
@@ -471,11 +471,6 @@ impl Simulation {
             recorder: Recorder::new(channels, stage.history_interval, self.dt),
             energy: Energy::new(self.kinetic_energy()),
             energy_history: EnergyHistory::new(stage.history_interval),
-            side_push: if free_field.is_some() {
-                vec![Vec2::zeros(); self.model.nodes()]
-            } else {
-                Vec::new()
-            },
             channel_values: vec![0.0; channels],
             pressure_envelope: (stage.pressure_envelope && self.flow.is_some())
                 .then(|| vec![0.0; self.model.nodes()]),
@@ -1019,11 +1014,17 @@ impl Simulation {
     }
 
     fn is_over(&self, shaking: &ActiveShaking) -> bool {
-        self.time + 0.5 * self.dt >= shaking.stage.duration
+        Self::ends(shaking, self.time, self.dt)
     }
 
-    /// Forces and accelerations, and velocities moved by them over `dt`; positions stay.
-    fn accelerate(&mut self, dt: f64) {
+    /// Whether the stage ends at a time (s) that is reached by steps of `dt`, s.
+    fn ends(shaking: &ActiveShaking, time: f64, dt: f64) -> bool {
+        time + 0.5 * dt >= shaking.stage.duration
+    }
+
+    /// Forces and accelerations, and velocities moved by them over `dt`; positions stay. Returns what is wanted of the
+    /// motion in statics or else.
+    fn accelerate<const STATICS: bool>(&mut self, dt: f64) -> MotionSum {
         self.prepare_printed_stress();
         let mut velocity = std::mem::take(&mut self.velocity);
         let mut acceleration = std::mem::take(&mut self.acceleration);
@@ -1032,86 +1033,72 @@ impl Simulation {
         let threaded = self.threads > 1;
         let nodes = self.model.nodes();
         let mut dispersion = self.dispersion.take();
+        let is_wet = self.flow.is_some();
         // The constant force comes last, so that a state at rest cancels to the last bit.
-        let bare = |this: &Self, j: usize, velocity: Vec2, water: &mut Vec2| {
+        let bare = |this: &Self, j: usize, velocity: Vec2, water: &mut Vec2, sum: &mut MotionSum| {
+            let (last_water, constant) = (*water, this.constant_force[j]);
             *water = this.water_force(j);
-            (this.internal_force(j, velocity, *water) + this.constant_force[j]) / this.mass[j]
+            if !STATICS {
+                sum.constant_power += constant.dot(&velocity);
+                if is_wet {
+                    sum.water_power += water.dot(&velocity);
+                    sum.last_water_power += last_water.dot(&velocity);
+                }
+            }
+            (this.internal_force(j, velocity, *water) + constant) / this.mass[j]
         };
+        sums.fill(MotionSum::default());
         let this = &*self;
         if let Some(dispersion) = &mut dispersion {
             let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: &mut water_force };
-            for_each_chunk(threaded, rows, &mut sums, |first, rows, _| {
+            for_each_chunk(threaded, rows, &mut sums, |first, rows, sum| {
                 for (k, (v, a)) in rows.a.iter().zip(rows.b.iter_mut()).enumerate() {
-                    *a = bare(this, first + k, *v, &mut rows.c[k]);
+                    *a = bare(this, first + k, *v, &mut rows.c[k], sum);
                 }
             });
             dispersion.gather(threaded, &this.geometry, &this.points, &acceleration);
         }
         let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: &mut water_force };
-        for_each_chunk(threaded, rows, &mut sums, |first, rows, sum| {
-            *sum = MotionSum::default();
+        for_each_chunk(threaded, rows, &mut sums, |first, rows, chunk| {
+            // In registers: memory that the loop may write elsewhere would be read back every time.
+            let mut sum = *chunk;
             for (k, (v, a)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
                 let j = first + k;
-                let mass = this.mass[j];
                 let acting = match &dispersion {
-                    None => bare(this, j, *v, &mut rows.c[k]),
-                    Some(dispersion) => *a + dispersion.acceleration(&this.geometry, j, mass),
+                    None => bare(this, j, *v, &mut rows.c[k], &mut sum),
+                    Some(dispersion) => *a + dispersion.acceleration(&this.geometry, j, this.mass[j]),
                 };
                 *a = acting;
                 *v += acting * dt;
-                let size = acting.norm();
-                sum.kinetic_energy += 0.5 * mass * v.norm_squared();
-                sum.acceleration += size;
-                sum.largest_acceleration = sum.largest_acceleration.max(size);
+                if STATICS {
+                    let size = acting.norm();
+                    sum.kinetic_energy += 0.5 * this.mass[j] * v.norm_squared();
+                    sum.acceleration += size;
+                    sum.largest_acceleration = sum.largest_acceleration.max(size);
+                }
             }
+            *chunk = sum;
         });
         self.counters.inertia_corrections += u64::from(dispersion.is_some());
         self.dispersion = dispersion;
-        (self.velocity, self.acceleration, self.sums) = (velocity, acceleration, sums);
-        self.water_force = water_force;
-    }
-
-    /// What a step did, after all its forces: kinetic energy, and the works of the constant forces and of the water.
-    fn step_work(&mut self, dt: f64) -> StepWork {
-        let mut sums = std::mem::take(&mut self.sums);
-        // Slices of nothing, which take no memory: the loop only reads.
-        let mut unit = [(); 3].map(|()| vec![(); self.model.nodes()]);
-        let [a, b, c] = &mut unit;
-        let this = &*self;
-        for_each_chunk(this.threads > 1, Rows { a, b, c }, &mut sums, |first, rows, sum| {
-            *sum = MotionSum::default();
-            for j in first..first + rows.a.len() {
-                let v = this.velocity[j];
-                let path = (v - this.acceleration[j] * (0.5 * dt)) * dt;
-                sum.kinetic_energy += 0.5 * this.mass[j] * v.norm_squared();
-                sum.constant_work += this.constant_force[j].dot(&path);
-                sum.water_work += this.water_force[j].dot(&path);
-            }
-        });
-        self.sums = sums;
-        let sum = self.motion_sum();
-        let (kinetic, constant, water) = (sum.kinetic_energy, sum.constant_work, sum.water_work);
-        StepWork { kinetic, constant, water, ..StepWork::default() }
-    }
-
-    /// Work of accelerations (m/s2) that were among those of the step, kJ/m.
-    fn work_of(&self, push: &[Vec2], dt: f64) -> f64 {
-        let motion = self.mass.iter().zip(&self.velocity).zip(&self.acceleration);
-        let work = |(((mass, v), a), push): (((&f64, &Vec2), &Vec2), &Vec2)| {
-            mass * push.dot(&(v - a * (0.5 * dt))) * dt
-        };
-        motion.zip(push).map(work).sum()
-    }
-
-    /// What the chunks of the velocity update found, added in order, whatever thread made them.
-    fn motion_sum(&self) -> MotionSum {
-        self.sums.iter().fold(MotionSum::default(), |total, chunk| MotionSum {
+        // In order, whatever thread made them.
+        let total = sums.iter().fold(MotionSum::default(), |total, chunk| MotionSum {
             kinetic_energy: total.kinetic_energy + chunk.kinetic_energy,
-            constant_work: total.constant_work + chunk.constant_work,
-            water_work: total.water_work + chunk.water_work,
             acceleration: total.acceleration + chunk.acceleration,
             largest_acceleration: total.largest_acceleration.max(chunk.largest_acceleration),
-        })
+            constant_power: total.constant_power + chunk.constant_power,
+            water_power: total.water_power + chunk.water_power,
+            last_water_power: total.last_water_power + chunk.last_water_power,
+        });
+        (self.velocity, self.acceleration, self.sums) = (velocity, acceleration, sums);
+        self.water_force = water_force;
+        total
+    }
+
+    /// Power of the last step's forces on the present velocities.
+    fn present_power(&self) -> Power {
+        let work = |forces: &[Vec2]| forces.iter().zip(&self.velocity).map(|(force, v)| force.dot(v)).sum();
+        Power { constant: work(&self.constant_force), water: work(&self.water_force) }
     }
 
     /// Kinetic energy, kJ/m.
@@ -1136,7 +1123,7 @@ impl Simulation {
     }
 
     /// Strain, soil model and the shares of the next force loop, from the velocity at mid-step.
-    fn update_stress(&mut self, dt: f64) -> Result<StressWork, SolverError> {
+    fn update_stress(&mut self, dt: f64, with_after: bool) -> Result<StressWork, SolverError> {
         let filter = self.filter();
         let report = self.soil.step(
             self.threads > 1,
@@ -1144,7 +1131,7 @@ impl Simulation {
             &self.velocity,
             (&mut self.points, &mut self.shares),
             (filter, dt),
-            &self.model.numerics.integrator,
+            (&self.model.numerics.integrator, with_after),
         );
         let (report, work) = report.map_err(|error| match error.soil_divergence() {
             Some((quantity, node, value)) => self.diverged(quantity, node, value),
@@ -1165,8 +1152,7 @@ impl Simulation {
         let Active::Gravity { kinetic_energy, .. } = self.active else { return Ok(()) };
         // From rest the first kick of a leapfrog spans half a step; a whole one would let modes near the
         // stability limit flip for ever between two stops.
-        self.accelerate(if kinetic_energy == 0.0 { 0.5 * dt } else { dt });
-        let sum = self.motion_sum();
+        let sum = self.accelerate::<true>(if kinetic_energy == 0.0 { 0.5 * dt } else { dt });
         let largest = sum.largest_acceleration / self.model.gravity;
         let mean = sum.acceleration / (self.model.gravity * self.model.nodes() as f64);
         self.check_finite("acceleration", |simulation, j| simulation.acceleration[j].norm(), f64::INFINITY)?;
@@ -1190,7 +1176,7 @@ impl Simulation {
         } else {
             *kinetic_energy = sum.kinetic_energy;
         }
-        self.update_stress(dt)?;
+        self.update_stress(dt, false)?;
         self.step += 1;
         self.time += dt;
         Ok(())
@@ -1216,19 +1202,16 @@ impl Simulation {
             let motion = (self.position.as_slice(), self.velocity.as_slice(), self.phases.volume());
             viscosity.update(self.threads > 1, (&self.model, &self.geometry), &self.points, motion);
         }
-        self.accelerate(dt);
+        let MotionSum { constant_power, water_power, last_water_power, .. } = self.accelerate::<false>(dt);
+        shaking.energy.end_step(Power { constant: constant_power, water: last_water_power });
+        shaking.energy.begin_step(dt, Power { constant: constant_power, water: water_power });
         let motion = (self.velocity.as_mut_slice(), self.acceleration.as_mut_slice());
-        let push = &mut shaking.side_push;
         if let Some(free_field) = &shaking.free_field {
-            push.iter_mut().zip(&*motion.1).for_each(|(push, a)| *push = -a);
             free_field.push(dt, &self.mass, motion.0, motion.1);
-            push.iter_mut().zip(&*motion.1).for_each(|(push, a)| *push += a);
         }
         shaking.base.end_step(self.time, dt, &self.mass, (&mut *motion.0, &mut *motion.1));
         if let Some(free_field) = &mut shaking.free_field {
-            push.iter_mut().zip(&*motion.1).for_each(|(push, a)| *push -= a);
             free_field.end_step(dt, &self.mass, motion.0, motion.1);
-            push.iter_mut().zip(&*motion.1).for_each(|(push, a)| *push += a);
             free_field.lend(&mut motion.0[self.mass.len()..], &mut motion.1[self.mass.len()..]);
             self.counters.free_field_calls += 1;
         }
@@ -1242,8 +1225,11 @@ impl Simulation {
             self.counters.edge_contacts += stick_to_edges(section, &self.position, motion.0, motion.1, dt);
         }
         let base = shaking.base.dashpots().work(dt, &self.velocity);
-        let sides = self.work_of(&shaking.side_push, dt);
-        shaking.energy.step(&StepWork { base, sides, local_damping, ..self.step_work(dt) });
+        let motion = (self.velocity.as_slice(), self.acceleration.as_slice());
+        let stressed = (&self.geometry, self.points.as_slice());
+        let sides =
+            shaking.free_field.as_ref().map_or(0.0, |free_field| free_field.work(dt, motion, stressed));
+        shaking.energy.step(&EdgeWork { base, sides, local_damping });
         self.counters.base_calls += 1;
         self.record(shaking);
         for (x, v) in self.position.iter_mut().zip(&self.velocity) {
@@ -1252,7 +1238,11 @@ impl Simulation {
         if let Some(flow) = &mut self.flow {
             flow.carry(&self.position);
         }
-        let work = self.update_stress(dt)?;
+        let end = self.time + dt;
+        // Nobody reads the accounts of a column.
+        let is_sampled =
+            !self.is_column && (shaking.energy_history.is_due(end) || Self::ends(shaking, end, dt));
+        let work = self.update_stress(dt, is_sampled)?;
         shaking.energy.strain(work);
         if let (Some(flow), Some(tables)) = (&mut self.flow, &self.geometry.flow) {
             self.counters.flow_calls += 1;
@@ -1265,7 +1255,11 @@ impl Simulation {
         self.step += 1;
         self.time += dt;
         let is_over = self.is_over(shaking);
-        shaking.energy_history.offer(self.time, is_over, &shaking.energy, &self.phases);
+        if is_sampled {
+            let mut energy = shaking.energy;
+            energy.end_step(self.present_power());
+            shaking.energy_history.push(self.time, &energy, self.kinetic_energy(), work.after, &self.phases);
+        }
         if is_over {
             shaking.recorder.finish(self.time);
         }
@@ -1290,8 +1284,10 @@ impl Simulation {
         }
         let column_strained = shaking.free_field.iter().flat_map(FreeField::columns).any(Self::is_strained);
         if !self.is_column && (self.is_strained() || column_strained) {
+            shaking.energy.end_step(self.present_power());
+            let before = self.kinetic_energy();
             self.renew_geometry(shaking.free_field.as_mut());
-            shaking.energy.renew(self.kinetic_energy());
+            shaking.energy.renew(self.kinetic_energy() - before);
         }
         Ok(())
     }
@@ -1357,8 +1353,11 @@ impl Simulation {
     }
 
     /// Refuses motion and pore pressure that are no longer finite, and motion that runs away. Strain and stress are
-    /// refused by the soil models, or show in the next step's motion.
-    fn guard(&self) -> Result<(), SolverError> {
+    /// refused by the soil models, or show in the next step's motion. Free-field columns come first: they drive the section.
+    pub(crate) fn guard(&self) -> Result<(), SolverError> {
+        if let Active::Shaking(shaking) = &self.active {
+            shaking.free_field.as_ref().map_or(Ok(()), FreeField::guard)?;
+        }
         self.check_finite("velocity", |simulation, j| simulation.velocity[j].norm(), RUNAWAY_SPEED)?;
         match &self.flow {
             Some(flow) => self.check_finite("pore pressure", |_, j| flow.excess(j).abs(), f64::INFINITY),

@@ -65,28 +65,32 @@ impl TryFrom<StoredLaw> for Law {
     }
 }
 
-/// Work of the effective stress in the strain of a step, kJ/m, with the stress before it and with the one after.
+/// Work of the effective stress in the strain of a step, kJ/m.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StressWork {
-    /// With the stress at the beginning of the step.
-    pub before: f64,
-    /// With the stress at its end.
+    /// With the mean of the stresses before and after it.
+    pub mean: f64,
+    /// With the stress after it; zero where it is not asked for.
     pub after: f64,
 }
 
 impl StressWork {
     /// Adds the work at a stress node that has been strained from the stress `before`.
     #[inline]
-    fn add(&mut self, before: &Stress, point: &StressPoint, increment: &StrainIncrement) {
-        let volume = point.volume * point.deformation.volume_ratio();
-        let (xx, yy, xy) = (volume * increment.xx, volume * increment.yy, volume * increment.xy);
-        let work = |stress: &Stress| stress.xx * xx + stress.yy * yy + stress.xy * xy;
-        self.before += work(before);
-        self.after += work(&point.stress);
+    fn add(&mut self, before: &Stress, point: &StressPoint, increment: &StrainIncrement, with_after: bool) {
+        let StrainIncrement { xx, yy, xy, .. } = increment;
+        // That in the middle of the step: an end of it would give or take energy, at first order in its strain.
+        let volume = point.volume * point.deformation.volume_ratio() * (1.0 - 0.5 * (xx + yy));
+        let after = &point.stress;
+        let twice = (before.xx + after.xx) * xx + (before.yy + after.yy) * yy + (before.xy + after.xy) * xy;
+        self.mean += 0.5 * volume * twice;
+        if with_after {
+            self.after += volume * (after.xx * xx + after.yy * yy + after.xy * xy);
+        }
     }
 
     fn merge(&mut self, other: &Self) {
-        self.before += other.before;
+        self.mean += other.mean;
         self.after += other.after;
     }
 }
@@ -120,6 +124,8 @@ struct Flowing<'a> {
     filter: f64,
     dt: f64,
     largest_step: f64,
+    /// Whether the work of the stress after the step is wanted, too.
+    with_after: bool,
 }
 
 /// Rows under a model with a state, whichever it is: the call through the table is one for each group and step.
@@ -157,7 +163,7 @@ impl<M: SoilModel> Plastic for Rowed<M> {
         integrator: &Integrator,
     ) {
         let model = &self.model;
-        let Flowing { geometry, velocity, filter, dt, largest_step } = flowing;
+        let Flowing { geometry, velocity, filter, dt, largest_step, with_after } = flowing;
         for_each_chunk(threaded, Rows { a, b, c: &mut self.states }, outcomes, |first, rows, outcome| {
             *outcome = Outcome::default();
             for k in 0..rows.a.len() {
@@ -175,7 +181,7 @@ impl<M: SoilModel> Plastic for Rowed<M> {
                     }
                 }
                 let before = std::mem::replace(&mut point.stress, model.stress(state));
-                outcome.work.add(&before, point, &increment);
+                outcome.work.add(&before, point, &increment, with_after);
                 set_moduli(point, model.moduli(state));
                 add_strain(point, &increment);
                 rows.b[k] = motion.share(point, geometry.covariance[s], filter);
@@ -297,7 +303,8 @@ impl SoilField {
     }
 
     /// Moves every stress node through one step: strain from the velocity field, stress from the soil model,
-    /// and the share that the force loop will gather. Returns what the models counted and what the stress did.
+    /// and the share that the force loop will gather. Returns what the models counted and what the stress did,
+    /// `with_after` also with the stress after the step.
     ///
     /// # Errors
     /// [`SolverError::Soil`] with the first node, in order, whose model failed.
@@ -308,7 +315,7 @@ impl SoilField {
         velocity: &[Vec2],
         (points, shares): (&mut [StressPoint], &mut [NodalShare]),
         (filter, dt): (f64, f64),
-        integrator: &Integrator,
+        (integrator, with_after): (&Integrator, bool),
     ) -> Result<(UpdateReport, StressWork), SolverError> {
         let (mut total, mut work) = (UpdateReport::default(), StressWork::default());
         for group in &mut self.groups {
@@ -325,21 +332,29 @@ impl SoilField {
                     // A slice of nothing, which takes no memory: the loop writes two arrays.
                     let c = &mut vec![(); a.len()];
                     for_each_chunk(threaded, Rows { a, b, c }, outcomes, |first, rows, outcome| {
-                        *outcome = Outcome::default();
+                        let mut work = StressWork::default();
                         for (k, (point, share)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
                             let s = first_row + first + k;
                             let motion = motion(geometry, s, velocity);
                             let increment = motion.advance(&mut point.deformation, dt);
                             let before = point.stress;
                             point.stress = elastic.moved(&before, &increment);
-                            outcome.work.add(&before, point, &increment);
+                            work.add(&before, point, &increment, with_after);
                             add_strain(point, &increment);
                             *share = motion.share(point, geometry.covariance[s], filter);
                         }
+                        *outcome = Outcome { work, ..Outcome::default() };
                     });
                 }
                 Law::Plastic(_, law) => {
-                    let flowing = Flowing { geometry, velocity, filter, dt, largest_step: self.largest_step };
+                    let flowing = Flowing {
+                        geometry,
+                        velocity,
+                        filter,
+                        dt,
+                        largest_step: self.largest_step,
+                        with_after,
+                    };
                     law.step(threaded, flowing, first_row, (a, b), outcomes, integrator);
                     for outcome in &*outcomes {
                         if let Some((s, source)) = &outcome.failure {

@@ -5,7 +5,9 @@ use crate::{
     stages::at_rest,
     waves::ricker,
 };
-use sandboil_solver::{Base, Conductivity, Model, Region, Shaking, Side, Support, UpgoingWave, Water};
+use sandboil_solver::{
+    Base, Conductivity, Model, Region, Shaking, Side, SolverError, Support, UpgoingWave, Water,
+};
 
 const HEIGHT: f64 = 10.0;
 const SPACING: f64 = 0.2;
@@ -160,4 +162,17 @@ fn stages_and_renewals_strike_no_blow() {
         assert!(renewed > builds);
         assert!(apart < 0.03 * peak, "{apart}");
     }
+}
+
+/// A column that runs away drives the section: it is told, with its node, before anybody can read or keep the state.
+#[test]
+fn a_column_that_runs_away_is_told_when_the_step_returns() {
+    let soil = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
+    let mut section = at_rest(&block(HEIGHT, SPACING, 3, soil, None));
+    let wave = UpgoingWave::shear(1e-3, vec![1e9; 1000]);
+    section.begin_shaking(on_free_field(shaking(Some(wave), 0.8, Vec::new()))).unwrap();
+    let Err(SolverError::Column { side: "left", source }) = section.advance(1, f64::INFINITY) else {
+        panic!("no word of the column")
+    };
+    assert!(matches!(*source, SolverError::Diverged { quantity: "velocity", node: 0, .. }), "{source}");
 }
