@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from ._errors import InvalidInput
@@ -66,10 +69,11 @@ def regions_above_water(scene: Scene) -> list[tuple[int, Region]]:
 
 def moving_conditions(scene: Scene, stage: Shaking) -> list[tuple[AnyCondition, float | None]]:
     """Conditions in a shaking stage, and what each prescribed at rest: :meth:`Scene.moving_conditions`."""
+    at_rest = _AtRest.of(scene)
     current = [
-        (condition, _value_at_rest(scene, condition))
-        for condition in (scene.seepage.conditions if scene.seepage else ())
-        if "free-field" not in _sides_along(scene, scene.condition_line(condition))
+        (condition, at_rest.value(condition, line))
+        for condition, line in _placed(scene, scene.seepage.conditions if scene.seepage else ())
+        if "free-field" not in _sides_along(scene, line)
     ]
     end = scene.seepage.duration if scene.seepage else None
     for before in scene.stages:
@@ -78,22 +82,46 @@ def moving_conditions(scene: Scene, stage: Shaking) -> list[tuple[AnyCondition, 
         if before.conditions is None:
             current = [(frozen(condition, end or 0.0), rest) for condition, rest in current]
         else:
-            current = [(condition, _value_at_rest(scene, condition)) for condition in before.conditions]
+            placed = _placed(scene, before.conditions)
+            current = [(condition, at_rest.value(condition, line)) for condition, line in placed]
         if before is stage:
             break
         end = scene.duration(before)
     return current
 
 
-def _value_at_rest(scene: Scene, condition: AnyCondition) -> float | None:
-    """What a condition prescribed at the end of seepage (0 for nothing); None if it did not hold."""
-    if scene.seepage is None:
+# A condition and the line on which it holds, found once: lines may have thousands of points.
+_Placed = tuple[AnyCondition, BaseGeometry]
+
+
+def _placed(scene: Scene, conditions: Sequence[AnyCondition]) -> list[_Placed]:
+    return [(condition, scene.condition_line(condition)) for condition in conditions]
+
+
+@dataclass(frozen=True)
+class _AtRest:
+    """The conditions at the end of a scene's seepage stage, `time` in s; none without one."""
+
+    conditions: Sequence[AnyCondition]
+    lines: NDArray[np.object_]
+    time: float
+
+    @classmethod
+    def of(cls, scene: Scene) -> _AtRest:
+        conditions = scene.seepage.conditions if scene.seepage else ()
+        end = scene.seepage.duration if scene.seepage else None
+        return cls(conditions, np.array([line for _, line in _placed(scene, conditions)]), end or 0.0)
+
+    def value(self, condition: AnyCondition, line: BaseGeometry) -> float | None:
+        """What a condition prescribed (0 for nothing); None if it did not hold."""
+        # The same points are told at once; the same line by others takes seconds where it has thousands.
+        same = shapely.equals_exact(self.lines, line)
+        if not same.any():
+            same = shapely.equals(self.lines, line)
+        for before in itertools.compress(self.conditions, same):
+            if before.kind == condition.kind:
+                return value_at(before, self.time)
         return None
-    line = scene.condition_line(condition)
-    for before in scene.seepage.conditions:
-        if before.kind == condition.kind and scene.condition_line(before).equals(line):
-            return value_at(before, scene.seepage.duration or 0.0)
-    return None
 
 
 def _sides_along(scene: Scene, line: BaseGeometry) -> set[str]:
@@ -158,9 +186,10 @@ def _check_seepage(scene: Scene, stage: Seepage, place: int) -> None:
             "must tell the pressure somewhere: with fluxes alone no state is steady, or any level is",
             "a Head, a Reservoir, a SeepageFace, or a duration",
         )
-    for k, condition in enumerate(stage.conditions):
+    placed = _placed(scene, stage.conditions)
+    for k, (condition, line) in enumerate(placed):
         own = f"{path}.conditions[{k}]"
-        _check_condition(scene, condition, own)
+        _check_condition(scene, condition, line, own)
         if is_steady and len(series_of(condition)) > 1:
             raise InvalidInput(
                 f"{own}.{prescribed(condition)}",
@@ -168,8 +197,8 @@ def _check_seepage(scene: Scene, stage: Seepage, place: int) -> None:
                 "must not change with time on the way to a steady state",
                 "give the stage a duration, in s",
             )
-    _check_shared_edges(scene, stage.conditions, f"{path}.conditions")
-    _check_desaturation(scene, stage)
+    _check_shared_edges(placed, f"{path}.conditions")
+    _check_desaturation(scene, placed)
 
 
 def _check_moving_water(scene: Scene, conditions: Sequence[AnyCondition], path: str) -> None:
@@ -179,17 +208,17 @@ def _check_moving_water(scene: Scene, conditions: Sequence[AnyCondition], path: 
         raise InvalidInput(path, kinds, "go with water, of which the scene has none", _WATER)
     if not _is_permeable(scene):
         raise InvalidInput(path, kinds, "need soil that water flows through", _PERMEABLE)
-    for k, condition in enumerate(conditions):
+    at_rest, placed = _AtRest.of(scene), _placed(scene, conditions)
+    for k, (condition, line) in enumerate(placed):
         own = f"{path}[{k}]"
-        _check_condition(scene, condition, own)
-        _check_beside_columns(scene, condition, own)
-        _check_flooded(scene, condition, own)
-    _check_shared_edges(scene, conditions, path)
+        _check_condition(scene, condition, line, own)
+        _check_beside_columns(scene, condition, line, at_rest, own)
+        _check_flooded(scene, condition, line, own)
+    _check_shared_edges(placed, path)
 
 
-def _check_condition(scene: Scene, condition: AnyCondition, path: str) -> None:
+def _check_condition(scene: Scene, condition: AnyCondition, line: BaseGeometry, path: str) -> None:
     """A condition holds on a line of the section, and its heads lie in it or above."""
-    line = scene.condition_line(condition)
     if isinstance(condition, Drain):
         if not shapely.buffer(scene.section, COORDINATE_TOLERANCE).covers(line):
             raise InvalidInput(
@@ -207,7 +236,7 @@ def _check_condition(scene: Scene, condition: AnyCondition, path: str) -> None:
         )
     else:
         if not isinstance(condition.on, str):
-            _check_points(scene, condition.on, f"{path}.on")
+            _check_points(scene, condition.on, line, f"{path}.on")
         if "periodic" in _sides_along(scene, line):
             raise InvalidInput(
                 f"{path}.on",
@@ -229,10 +258,20 @@ def _check_condition(scene: Scene, condition: AnyCondition, path: str) -> None:
                 )
 
 
-def _check_points(scene: Scene, points: Sequence[tuple[float, float]], path: str) -> None:
+@functools.lru_cache(maxsize=8)
+def _band(edge: BaseGeometry, width: float) -> BaseGeometry:
+    """What lies within a distance (m) of an edge, less a sliver where the edge turns; quick to ask."""
+    band = shapely.buffer(edge, width)
+    shapely.prepare(band)
+    return band
+
+
+def _check_points(scene: Scene, points: Sequence[tuple[float, float]], line: BaseGeometry, path: str) -> None:
     """The points of a line, and what lies between them, must be on the edge."""
     edge = scene.section.exterior
-    away = shapely.distance(shapely.points(points), edge)
+    if _band(edge, scene.spacing).covers(line):
+        return
+    away = shapely.distance(shapely.points(np.array(points)), edge)
     farthest = int(np.argmax(away))
     hint = "for a line inside the section: Drain"
     if away[farthest] > scene.spacing:
@@ -242,8 +281,8 @@ def _check_points(scene: Scene, points: Sequence[tuple[float, float]], path: str
             f"must lie on the edge of the section, it is {away[farthest]:.3g} m away",
             hint,
         )
-    between = shapely.segmentize(shapely.LineString(points), scene.spacing)
-    away = shapely.distance(shapely.points(between.coords), edge)
+    between = shapely.segmentize(line, scene.spacing)
+    away = shapely.distance(shapely.points(shapely.get_coordinates(between)), edge)
     if away.max() > scene.spacing:
         raise InvalidInput(
             path,
@@ -253,32 +292,42 @@ def _check_points(scene: Scene, points: Sequence[tuple[float, float]], path: str
         )
 
 
-def _check_shared_edges(scene: Scene, conditions: Sequence[AnyCondition], path: str) -> None:
+def _check_shared_edges(placed: Sequence[_Placed], path: str) -> None:
     """No stretch of edge may obey two conditions."""
-    edges = []
-    for k, condition in enumerate(conditions):
-        if not isinstance(condition, Drain):
-            line = scene.condition_line(condition)
-            edges.append((k, condition, line, shapely.buffer(line, COORDINATE_TOLERANCE)))
-    for (k, _, _, reach), (m, other, line, _) in itertools.combinations(edges, 2):
-        common = line.intersection(reach)
+    edges = [
+        (k, condition.on, line)
+        for k, (condition, line) in enumerate(placed)
+        if not isinstance(condition, Drain)
+    ]
+    if len(edges) < 2:
+        return
+    lines = [line for _, _, line in edges]
+    pairs = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=COORDINATE_TOLERANCE).T
+    for i, j in sorted((int(i), int(j)) for i, j in pairs if i < j):
+        (k, _, one), (m, on, line) = edges[i], edges[j]
+        # All of the one that the other reaches: a line may be long, and meet its neighbour at its end alone.
+        x0, y0, x1, y1 = line.bounds
+        margin = 2.0 * COORDINATE_TOLERANCE
+        near = shapely.clip_by_rect(one, x0 - margin, y0 - margin, x1 + margin, y1 + margin)
+        common = line.intersection(shapely.buffer(near, COORDINATE_TOLERANCE))
         # Lines that meet share the reach of their ends.
         if common.length > 4.0 * COORDINATE_TOLERANCE:
             x0, y0, x1, y1 = common.bounds
             raise InvalidInput(
                 f"{path}[{m}].on",
-                other.on,
+                on,
                 f"must leave out the edge of conditions[{k}], but they share x {x0:g} to {x1:g}, "
                 f"y {y0:g} to {y1:g}",
                 "cut it by x = (left, right) or by points",
             )
 
 
-def _check_beside_columns(scene: Scene, condition: AnyCondition, path: str) -> None:
+def _check_beside_columns(
+    scene: Scene, condition: AnyCondition, line: BaseGeometry, at_rest: _AtRest, path: str
+) -> None:
     """Free-field columns know no conditions of their own."""
     if "free-field" not in scene.side_kinds or isinstance(condition, Drain):
         return
-    line = scene.condition_line(condition)
     if "free-field" in _sides_along(scene, line):
         raise InvalidInput(
             f"{path}.on",
@@ -287,7 +336,7 @@ def _check_beside_columns(scene: Scene, condition: AnyCondition, path: str) -> N
             "leave the condition out",
         )
     on_surface = line.distance(scene.outline.edges["surface"]) <= COORDINATE_TOLERANCE
-    if on_surface and (len(series_of(condition)) > 1 or _value_at_rest(scene, condition) is None):
+    if on_surface and (len(series_of(condition)) > 1 or at_rest.value(condition, line) is None):
         name = prescribed(condition) or "on"
         raise InvalidInput(
             f"{path}.{name}",
@@ -298,12 +347,11 @@ def _check_beside_columns(scene: Scene, condition: AnyCondition, path: str) -> N
         )
 
 
-def _check_flooded(scene: Scene, condition: AnyCondition, path: str) -> None:
+def _check_flooded(scene: Scene, condition: AnyCondition, line: BaseGeometry, path: str) -> None:
     """Soil that is dry at rest takes no water: it has no retention curve to tell how."""
     if not scene.is_partly_saturated or scene.holds_suction or isinstance(condition, Drain | SeepageFace):
         return
-    line = shapely.segmentize(scene.condition_line(condition), scene.spacing)
-    x, y = shapely.get_coordinates(line).T
+    x, y = shapely.get_coordinates(shapely.segmentize(line, scene.spacing)).T
     dry = y > scene.water_level_at(x) + COORDINATE_TOLERANCE
     told = heads_of(condition)
     comes = np.inf if told is None else max(value for _, value in told[1])
@@ -316,12 +364,13 @@ def _check_flooded(scene: Scene, condition: AnyCondition, path: str) -> None:
         )
 
 
-def _check_desaturation(scene: Scene, stage: Seepage) -> None:
+def _check_desaturation(scene: Scene, placed: Sequence[_Placed]) -> None:
     """Soil that heads leave above them must say what it holds."""
-    drowned = _is_drowned(scene, stage)
+    drained = any(isinstance(condition, Drain) for condition, _ in placed)
+    drowned = drained and _is_drowned(scene, placed)
     levels = [
-        _lowest_head(scene, condition)
-        for condition in stage.conditions
+        _lowest_head(scene, condition, line)
+        for condition, line in placed
         if not (drowned and isinstance(condition, Drain))
     ]
     level = min([*levels, float(scene.water_level_at(np.array(scene.bounds[0::2])).min())])
@@ -336,22 +385,21 @@ def _check_desaturation(scene: Scene, stage: Seepage) -> None:
             )
 
 
-def _lowest_head(scene: Scene, condition: AnyCondition) -> float:
+def _lowest_head(scene: Scene, condition: AnyCondition, line: BaseGeometry) -> float:
     """The lowest head that a condition may draw the water down to, m; infinite if it tells none."""
     if (told := heads_of(condition)) is not None:
         return min(value for _, value in told[1])
-    bottom = float(scene.condition_line(condition).bounds[1])
+    bottom = float(line.bounds[1])
     if isinstance(condition, Pressure) and scene.water is not None:
         return bottom + min(value for _, value in condition.pressure) / scene.water.unit_weight
     return bottom if isinstance(condition, SeepageFace | Drain) else float("inf")
 
 
-def _is_drowned(scene: Scene, stage: Seepage) -> bool:
+def _is_drowned(scene: Scene, placed: Sequence[_Placed]) -> bool:
     """Whether open water stands on all of the ground: a drain then draws through what stays full."""
     dry = scene.outline.edges["surface"]
-    for condition in stage.conditions:
-        if (told := heads_of(condition)) is not None:
-            line = scene.condition_line(condition)
-            if min(value for _, value in told[1]) >= line.bounds[3] - COORDINATE_TOLERANCE:
-                dry = dry.difference(shapely.buffer(line, COORDINATE_TOLERANCE))
+    for condition, line in placed:
+        told = heads_of(condition)
+        if told and min(value for _, value in told[1]) >= line.bounds[3] - COORDINATE_TOLERANCE:
+            dry = dry.difference(shapely.buffer(line, COORDINATE_TOLERANCE))
     return bool(dry.length <= COORDINATE_TOLERANCE)
