@@ -644,8 +644,8 @@ class Simulation:
         particle of flowing ground was stopped at base or side, `inadmissible_starts` stresses at rest that
         the soil of shaking could not carry, `pressure_floors` stresses held at the soil's least pressure,
         `bounding_caps` those taken back to PM4Sand's bounding surface, `tension_cutoffs` and `apex_returns`
-        updates that ended at a cut-off of tension or at an apex, `forced_acceptances` parts of a step taken at
-        the smallest size although their error was above the tolerance, `reversals` updates of a soil's
+        updates that ended at a cut-off of tension or at an apex, `forced_acceptances` parts of a step taken
+        at the smallest size although their error was above the tolerance, `reversals` updates of a soil's
         reference stress, of which `near_neutral_reversals` might fall otherwise with other steps.
         Seepage has its own, `seepage_...`.
         """
