@@ -103,6 +103,7 @@ def told(scene: sb.Scene, threads: int) -> tuple[Floats, dict[str, float]]:
         "front, m": front(places, scene.spacing),
         "top, m": float(places[:, 1].max()),
         "mean speed, m/s": float(np.sqrt((speed**2).mean())),
+        "nodes": len(places),
         "steps": simulation.steps,
         "geometries": simulation.counters()["geometry_builds"],
         "s": seconds,
@@ -116,7 +117,7 @@ def row(name: str, shown: dict[str, float]) -> None:
 
 def head(first: str) -> None:
     """Print the head of a table."""
-    names = ["front, m", "top, m", "mean speed, m/s", "steps", "geometries", "s"]
+    names = ["front, m", "top, m", "mean speed, m/s", "nodes", "steps", "geometries", "s"]
     print(f"\n| {first} | " + " | ".join(names) + " |")
     print("|---" * (len(names) + 1) + "|")
 
@@ -155,12 +156,12 @@ def trades(figure: Figure, threads: int) -> None:
         for value in values:
             _, shown = told(heap(**{name: value}), threads)
             row(f"{name} {value:g}", shown)
-            curves[name][0].append(shown["s"])
+            curves[name][0].append(shown["steps"] * shown["nodes"] / 1e6)
             curves[name][1].append(shown["front, m"])
     axes = figure.add_subplot(1, 3, 2)
-    for name, (seconds, fronts) in curves.items():
-        axes.semilogx(seconds, fronts, "o-", ms=3.0, label=name)
-    axes.set(xlabel="run time, s", ylabel="front, m", title="what choices cost and change")
+    for name, (work, fronts) in curves.items():
+        axes.semilogx(work, fronts, "o-", ms=3.0, label=name)
+    axes.set(xlabel="updates of a node, millions", ylabel="front, m", title="what choices cost and change")
     axes.legend(fontsize=7)
 
 
