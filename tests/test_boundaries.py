@@ -34,7 +34,7 @@ from sandboil import (
     plan,
     polygon,
 )
-from sandboil.simulation import _description, _shaking_description, doubts, loaded_motions, probes_of
+from sandboil.simulation import _description, _moving_description, doubts, loaded_motions, probes_of
 
 ROCK = Elastic(E=2.0e5, nu=0.3)
 PULSE = Motion.ricker(frequency=4.0, pga_g=0.2)
@@ -64,7 +64,7 @@ def sent(scene: Scene) -> dict[str, Any]:
     probes = probes_of(scene, discretise(scene))
     duration = scene.duration(stage)
     assert duration is not None
-    return _shaking_description(scene, stage, duration, motions.waves(), probes)
+    return _moving_description(scene, stage, duration, motions.waves(), probes)
 
 
 # Outline
