@@ -328,7 +328,11 @@ impl Simulation {
         if found != expected {
             return Err(SolverError::Shape { name: "excess_pore_pressure", found, expected });
         }
-        let (Active::Shaking(shaking), 0, Some(flow)) = (&mut self.active, self.step, &mut self.flow) else {
+        // Ground that flows has no load that stays.
+        let is_held = self.flowing.is_none();
+        let (Active::Shaking(shaking), 0, Some(flow), true) =
+            (&mut self.active, self.step, &mut self.flow, is_held)
+        else {
             return Err(SolverError::Order {
                 call: "set_excess_pore_pressure",
                 needs: "water and a shaking stage that has just begun",

@@ -68,13 +68,14 @@ fn history(rows: &[f64], name: &str) -> Vec<f64> {
     rows.chunks(ENERGY_NAMES.len()).map(|row| row[k]).collect()
 }
 
-/// Runs a heap to rest. What the forces of the skeleton take never falls: the energy of motion, weight, stress and water
+/// Runs a heap until at most a share `rest` of the peak of its kinetic energy is left. What the forces of the skeleton take never falls: the energy of motion, weight, stress and water
 /// together never grows. No grain is lost.
 fn comes_to_rest(
     name: &str,
     model: &Model,
     still_water: Option<Vec<Vec2>>,
     duration: f64,
+    rest: f64,
 ) -> (Simulation, String) {
     let mut simulation = Simulation::new(model, 2).unwrap();
     simulation.begin_shaking(run_out(duration, still_water)).unwrap();
@@ -93,7 +94,7 @@ fn comes_to_rest(
         simulation.counters().geometry_builds
     );
     assert!(solid.iter().all(|mass| mass == &solid[0]), "{name}");
-    assert!(left < 1e-4, "{name}: {left}");
+    assert!(left < rest, "{name}: {left}");
     assert!(given < 1e-9 * peak, "{name}: {given}");
     (simulation, told)
 }
@@ -101,11 +102,11 @@ fn comes_to_rest(
 #[test]
 fn dry_heap_comes_to_rest() {
     let spacing = 0.005;
-    let (simulation, told) = comes_to_rest("dry", &heap(spacing, None, 0.0), None, 0.9);
+    let (simulation, told) = comes_to_rest("dry", &heap(spacing, None, 0.0), None, 0.9, 1e-5);
     let front = front(&simulation, spacing);
     let top = simulation.position().iter().map(|at| at[1]).fold(0.0, f64::max);
     println!("{told}, top {top:.4} m");
-    assert!((0.34..0.41).contains(&front) && (top - 0.0975).abs() < 1e-3, "{front} {top}");
+    assert!((0.36..0.41).contains(&front) && (top - 0.0975).abs() < 1e-3, "{front} {top}");
 }
 
 /// Wet and submerged heaps, where water cannot leave, hardly can, and is gone in a moment: they run further where it can.
@@ -120,7 +121,7 @@ fn saturated_heaps_come_to_rest() {
             model.pore_pressure =
                 model.position.iter().map(|at| if depth > 0.0 { pressure(at) } else { 0.0 }).collect();
             let told = format!("{name}, k {conductivity} m/s");
-            let (simulation, told) = comes_to_rest(&told, &model, None, 3.0);
+            let (simulation, told) = comes_to_rest(&told, &model, None, 3.0, 1e-4);
             println!("{told}");
             front(&simulation, spacing)
         });
@@ -273,4 +274,8 @@ fn what_does_not_flow_is_refused() {
     let mut simulation = Simulation::new(&model, 1).unwrap();
     simulation.begin_shaking(run_out(0.01, None)).unwrap();
     assert!(simulation.begin_shaking(run_out(0.01, None)).is_err());
+    let wet = heap(0.01, Some(WATER), 0.0);
+    let mut simulation = Simulation::new(&wet, 1).unwrap();
+    simulation.begin_shaking(run_out(0.01, None)).unwrap();
+    assert!(simulation.set_excess_pore_pressure(&vec![1.0; wet.nodes()]).is_err());
 }
