@@ -242,8 +242,8 @@ const MAX_STATE_BYTES: u64 = 1 << 36;
 fn stored(path: &Path) -> io::Result<Vec<u8>> {
     let file = File::open(path)?;
     let mut bytes = Vec::new();
-    (&file).take(solver::state::MAGIC.len() as u64).read_to_end(&mut bytes)?;
-    if bytes == solver::state::MAGIC {
+    (&file).take(solver::checkpoint::MAGIC.len() as u64).read_to_end(&mut bytes)?;
+    if bytes == solver::checkpoint::MAGIC {
         let rest = file.metadata()?.len().min(MAX_STATE_BYTES);
         bytes.reserve_exact(usize::try_from(rest).unwrap_or_default());
         (&file).take(MAX_STATE_BYTES).read_to_end(&mut bytes)?;
@@ -256,7 +256,7 @@ fn stored(path: &Path) -> io::Result<Vec<u8>> {
 #[allow(clippy::needless_pass_by_value)] // PyO3 gives paths as owned values only
 pub fn stored_note(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyBytes>> {
     let bytes = py.detach(|| stored(&path))?;
-    match py.detach(|| solver::state::note(&bytes)) {
+    match py.detach(|| solver::checkpoint::note(&bytes)) {
         Ok(note) => Ok(PyBytes::new(py, note)),
         Err(error) => Err(state_error(py, &path, &error)?),
     }

@@ -1,6 +1,5 @@
 //! What can go wrong in a solve, with the numbers a user needs to find the place.
 
-use crate::state::StateError;
 use sandboil_soil::SoilError;
 
 /// Errors of building or advancing a simulation.
@@ -115,4 +114,29 @@ impl SolverError {
             _ => None,
         }
     }
+}
+
+/// Why stored bytes cannot be gone on with.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum StateError {
+    /// Bytes of something else.
+    #[error("is no stored simulation")]
+    Foreign,
+    /// Bytes of another layout.
+    #[error("has format version {found}, and {needed} is needed")]
+    Version {
+        /// The version found.
+        found: u32,
+        /// The version of this build.
+        needed: u32,
+    },
+    /// Bytes that are not as they were written.
+    #[error("is damaged: {0}")]
+    Damaged(&'static str),
+    /// Bytes that another build wrote.
+    #[error("was stored by another build of sandboil")]
+    Build,
+    /// A state of another section.
+    #[error("is that of another section")]
+    OtherModel,
 }

@@ -4,59 +4,46 @@
 //! Equation numbers are those of Mhaski & Ramana (2025), CMES 142(1). Units: kN, m, s, Mg; stress tension
 //! positive, pore pressure compression positive; x horizontal, y up.
 
-mod balance;
-mod banded;
-pub mod base;
-mod bins;
-pub mod boundary;
-pub mod column;
-mod conduction;
-mod contacts;
-mod deformation;
-mod dispersion;
-mod energy;
-pub mod error;
-mod flow;
-mod free_field;
-mod free_surface;
-mod geometry;
-pub mod hydraulics;
-pub mod model;
+mod edges;
+mod error;
+mod linear;
 mod parallel;
-mod phases;
-mod rayleigh;
-mod record;
-mod run_out;
-pub mod seepage;
-pub mod shear_cell;
-pub mod simulation;
+mod run;
+mod section;
 mod skeleton;
-mod soil_field;
+mod stages;
 #[cfg(test)]
-mod spectrum_tests;
-pub mod state;
-mod still_water;
-mod timestep;
-mod water_edges;
-mod wetting;
+mod testing;
+mod water;
+mod weights;
 
-pub use base::{Base, BaseSegment, HalfSpace, Impedance, UpgoingWave, Vertical};
-pub use boundary::{Outline, Side, Support};
-pub use column::ColumnRecord;
-pub use energy::ENERGY_NAMES;
-pub use error::SolverError;
-pub use hydraulics::{HydraulicBoundary, HydraulicCondition, Series};
-pub use model::{
-    AccelerationTerm, Conductivity, Diffusion, Model, Numerics, Operators, Region, Water, stress_node_offset,
+pub use edges::base::{Base, BaseSegment, HalfSpace, Impedance, UpgoingWave, Vertical};
+pub use error::{SolverError, StateError};
+pub use run::{
+    checkpoint,
+    energy::ENERGY_NAMES,
+    simulation::{ACCELERATION_TERM_CONDUCTIVITY, Counters, Gravity, SHAKING_FACTOR, Shaking, Simulation},
+    time_step::Criterion,
 };
-pub use rayleigh::Rayleigh;
-pub use run_out::RunOut;
+
 pub use sandboil_sph::{Period, Vec2};
-pub use seepage::{Seepage, SeepageCounters, Until, WaterBalance};
-pub use shear_cell::{CellTest, Departure, ShearCell};
-pub use simulation::{
-    ACCELERATION_TERM_CONDUCTIVITY, Counters, Gravity, SHAKING_FACTOR, Shaking, Simulation,
+pub use section::{
+    description::{
+        AccelerationTerm, Conductivity, Diffusion, Model, Numerics, Operators, Region, Water,
+        stress_node_offset,
+    },
+    outline::{Outline, Side, Support},
 };
-pub use state::StateError;
-pub use timestep::Criterion;
-pub use water_edges::MovingBoundary;
+
+pub use skeleton::rayleigh::Rayleigh;
+pub use stages::{
+    column::ColumnRecord,
+    run_out::RunOut,
+    seepage::{Seepage, SeepageCounters, Until, WaterBalance},
+    shear_cell::{CellTest, Departure, ShearCell},
+};
+
+pub use water::{
+    conditions::{HydraulicBoundary, HydraulicCondition, Series},
+    moving_edges::MovingBoundary,
+};

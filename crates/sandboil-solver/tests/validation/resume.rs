@@ -16,7 +16,7 @@ use sandboil_soil::{
 };
 use sandboil_solver::{
     Conductivity, Diffusion, Gravity, Model, Operators, Rayleigh, Region, Shaking, Simulation, SolverError,
-    StateError, UpgoingWave, Water, state,
+    StateError, UpgoingWave, Water, checkpoint,
 };
 use sandboil_sph::Vec2;
 use std::sync::LazyLock;
@@ -186,7 +186,7 @@ fn refusal(bytes: &[u8]) -> StateError {
 #[test]
 fn a_state_of_something_else_is_refused() {
     let (model, bytes) = &*SMALL;
-    assert_eq!(state::note(bytes).unwrap(), b"note");
+    assert_eq!(checkpoint::note(bytes).unwrap(), b"note");
     let mut other = model.clone();
     other.regions[0].porosity += 1e-12;
     let error = Simulation::restore(&other, 1, bytes).unwrap_err();
@@ -195,7 +195,7 @@ fn a_state_of_something_else_is_refused() {
     assert_eq!(refusal(b""), StateError::Foreign);
     let mut of_version_nine = bytes.clone();
     of_version_nine[8] = 9;
-    assert_eq!(refusal(&of_version_nine), StateError::Version { found: 9 });
+    assert_eq!(refusal(&of_version_nine), StateError::Version { found: 9, needed: 1 });
     let mut of_other_build = bytes.clone();
     of_other_build[12] ^= 1;
     assert_eq!(refusal(&summed_anew(of_other_build)), StateError::Build);
@@ -228,7 +228,7 @@ proptest! {
         let error = refusal(&bytes);
         let head = places.iter().any(|&place| place < 12);
         prop_assert!(head || matches!(error, StateError::Damaged(_)), "{error}");
-        prop_assert!(state::note(&bytes).is_err());
+        prop_assert!(checkpoint::note(&bytes).is_err());
     }
 
     #[test]

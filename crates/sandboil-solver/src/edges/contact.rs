@@ -1,0 +1,73 @@
+//! Contact of single nodes with edges. A node without neighbours has no strain, and so no stress that would stop it at an
+//! edge: it sticks there.
+
+use crate::section::{
+    description::Model,
+    outline::{Hand, Outline},
+};
+use sandboil_sph::Vec2;
+
+/// Least distance of a node from an edge, in spacings: a bed of nodes has half of one.
+pub const LEAST_DISTANCE: f64 = 0.2;
+/// Stops nodes that would come too near an edge in the step. Returns how many.
+pub fn stick_to_edges(
+    (model, outline): (&Model, &Outline),
+    position: &[Vec2],
+    velocity: &mut [Vec2],
+    acceleration: &mut [Vec2],
+    dt: f64,
+) -> u64 {
+    let least = LEAST_DISTANCE * model.mean_spacing();
+    let comes_near = |from: Vec2, to: Vec2| {
+        let nears_base = outline.nearest_on_base(to).is_some_and(|(foot, _)| {
+            let beyond = outline.base_elevation(to.x) > to.y;
+            (beyond || (to - foot).norm() < least) && (to - from).dot(&outline.base_normal(to.x)) > 0.0
+        });
+        let nears_side = |(hand, side): (Hand, &Option<crate::Side>)| {
+            side.is_some_and(|side| {
+                let out = hand.normal().x;
+                (side.extent[0]..=side.extent[1]).contains(&to.y)
+                    && out * (side.x - to.x) < least
+                    && out * (to.x - from.x) > 0.0
+            })
+        };
+        nears_base || Hand::BOTH.into_iter().zip(&outline.sides).any(nears_side)
+    };
+    let mut stopped = 0;
+    for ((at, v), a) in position.iter().zip(velocity).zip(acceleration) {
+        if *v != Vec2::zeros() && comes_near(*at, at + *v * dt) {
+            *a -= *v / dt;
+            *v = Vec2::zeros();
+            stopped += 1;
+        }
+    }
+    stopped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::square_block;
+
+    /// A grain that flies to the base or to a wall stops before it; one that leaves goes on.
+    #[test]
+    fn grains_stick_to_edges() {
+        let mut model = square_block(1);
+        model.outline = Outline::level(0.0);
+        model.outline.sides[1] =
+            Some(crate::Side { x: 5.0, extent: [0.0, 3.0], support: crate::Support::FreeSlip });
+        let stopped = |at: Vec2, velocity: Vec2| {
+            let (mut v, mut a) = ([velocity], [Vec2::zeros()]);
+            let count = stick_to_edges((&model, &model.outline), &[at], &mut v, &mut a, 0.1);
+            assert_eq!(count == 1, v[0] == Vec2::zeros());
+            assert!((a[0] * 0.1 + velocity - v[0]).norm() < 1e-15);
+            count == 1
+        };
+        assert!(stopped(Vec2::new(1.0, 0.3), Vec2::new(1.0, -2.0)));
+        assert!(stopped(Vec2::new(1.0, 0.3), Vec2::new(1.0, -9.0)));
+        assert!(!stopped(Vec2::new(1.0, 0.3), Vec2::new(1.0, 0.1)));
+        assert!(!stopped(Vec2::new(1.0, 0.9), Vec2::new(1.0, -2.0)));
+        assert!(stopped(Vec2::new(4.7, 1.0), Vec2::new(2.0, 0.0)));
+        assert!(!stopped(Vec2::new(4.7, 4.0), Vec2::new(2.0, 0.0)));
+    }
+}

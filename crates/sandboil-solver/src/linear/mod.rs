@@ -1,0 +1,4 @@
+//! Linear systems.
+
+pub mod banded;
+pub mod conjugate_gradients;

@@ -1,0 +1,28 @@
+//! What a stress node carries besides the state of its soil model.
+
+use crate::skeleton::deformation::Deformation;
+use sandboil_soil::Stress;
+
+/// What a stress node carries besides the state of its soil model.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct StressPoint {
+    /// Effective stress, kPa, tension positive.
+    pub stress: Stress,
+    /// Total strain `(xx, yy, engineering xy)` since the stage began, tension positive.
+    pub strain: [f64; 3],
+    /// Current elastic shear modulus, kPa.
+    pub shear_modulus: f64,
+    /// Current skeleton stiffness `K + 4G/3`, kPa.
+    pub stiffness: f64,
+    /// Mixture density, Mg/m3.
+    pub density: f64,
+    /// Volume per unit thickness when the geometry was built: an equal share of its velocity node's, m2.
+    pub volume: f64,
+    /// Deformation since then.
+    pub deformation: Deformation,
+}
+
+/// Engineering shear strain of the largest in-plane Mohr circle.
+pub fn maximum_shear_strain([xx, yy, xy]: [f64; 3]) -> f64 {
+    (xx - yy).hypot(xy)
+}

@@ -1,0 +1,448 @@
+//! Soil models at the stress nodes, region by region: which model runs where is decided once per stage.
+
+use crate::{
+    error::SolverError,
+    parallel::{Rows, chunks, for_each_chunk},
+    section::description::{Model, STRESS_NODES},
+    skeleton::{
+        point::StressPoint,
+        strain_and_force::{NodalShare, motion},
+    },
+    weights::geometry::Geometry,
+};
+use sandboil_soil::{
+    Integrator, Moduli, Soil, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport, elastic::Elastic,
+    with_model,
+};
+use sandboil_sph::Vec2;
+use serde::{Serialize, Serializer, ser::Error as _};
+use std::{fmt::Debug, ops::Range};
+
+/// One region's stress nodes under one model.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+struct Group {
+    region: usize,
+    rows: Range<usize>,
+    law: Law,
+}
+
+#[derive(Debug, serde::Deserialize)]
+#[serde(try_from = "StoredLaw")]
+enum Law {
+    /// Linear elasticity remembers nothing but the stress, which the stress nodes hold already.
+    Elastic(Elastic),
+    /// A model with a state, and the soil it came from.
+    Plastic(Soil, Box<dyn Plastic>),
+}
+
+/// A [`Law`] as it is stored: whichever state a plastic model has, as bytes.
+#[derive(serde::Serialize, serde::Deserialize)]
+enum StoredLaw {
+    Elastic(Elastic),
+    Plastic(Soil, Vec<u8>),
+}
+
+impl Serialize for Law {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Elastic(law) => StoredLaw::Elastic(*law),
+            Self::Plastic(soil, rows) => {
+                StoredLaw::Plastic(soil.clone(), rows.states().map_err(S::Error::custom)?)
+            }
+        }
+        .serialize(serializer)
+    }
+}
+
+impl TryFrom<StoredLaw> for Law {
+    type Error = postcard::Error;
+
+    fn try_from(stored: StoredLaw) -> postcard::Result<Self> {
+        match stored {
+            StoredLaw::Elastic(law) => Ok(Self::Elastic(law)),
+            StoredLaw::Plastic(soil, states) => {
+                let rows = with_model!(&soil, law => restored_rows(law, &states)?);
+                Ok(Self::Plastic(soil, rows))
+            }
+        }
+    }
+}
+
+/// Work of the effective stress in the strain of a step, kJ/m.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StressWork {
+    /// With the mean of the stresses before and after it.
+    pub mean: f64,
+    /// With the stress after it; zero where it is not asked for.
+    pub after: f64,
+}
+
+impl StressWork {
+    /// Adds the work at a stress node that has been strained from the stress `before`.
+    #[inline]
+    fn add(&mut self, before: &Stress, point: &StressPoint, increment: &StrainIncrement, with_after: bool) {
+        let StrainIncrement { xx, yy, xy, .. } = increment;
+        // That in the middle of the step: an end of it would give or take energy, at first order in its strain.
+        let volume = point.volume * point.deformation.volume_ratio() * (1.0 - 0.5 * (xx + yy));
+        let after = &point.stress;
+        let twice = (before.xx + after.xx) * xx + (before.yy + after.yy) * yy + (before.xy + after.xy) * xy;
+        self.mean += 0.5 * volume * twice;
+        if with_after {
+            self.after += volume * (after.xx * xx + after.yy * yy + after.xy * xy);
+        }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.mean += other.mean;
+        self.after += other.after;
+    }
+}
+
+/// Outcome of one chunk of updates.
+#[derive(Debug, Clone, Default)]
+struct Outcome {
+    report: UpdateReport,
+    work: StressWork,
+    failure: Option<(usize, SoilError)>,
+}
+
+/// The soil models of a stage.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+pub struct SoilField {
+    groups: Vec<Group>,
+    /// Stress nodes whose soil could not carry the stress they began with.
+    inadmissible_starts: u64,
+    /// Of the chunks of the longest group, in a step. A field that was restored has none before its first step.
+    #[serde(skip)]
+    outcomes: Vec<Outcome>,
+    /// Largest strain component of one step.
+    largest_step: f64,
+}
+
+/// The velocity field of a step, and what the force loop wants of it.
+#[derive(Clone, Copy)]
+struct Flowing<'a> {
+    geometry: &'a Geometry,
+    velocity: &'a [Vec2],
+    filter: f64,
+    dt: f64,
+    largest_step: f64,
+    /// Whether the work of the stress after the step is wanted, too.
+    with_after: bool,
+}
+
+/// Rows under a model with a state, whichever it is: the call through the table is one for each group and step.
+trait Plastic: Debug + Send + Sync {
+    fn step(
+        &mut self,
+        threaded: bool,
+        flowing: Flowing<'_>,
+        first_row: usize,
+        rows: (&mut [StressPoint], &mut [NodalShare]),
+        outcomes: &mut [Outcome],
+        integrator: &Integrator,
+    );
+    fn void_ratio(&self, row: usize) -> Option<f64>;
+    fn points(&self) -> usize;
+    fn state_bytes(&self) -> usize;
+    /// The states as they are stored.
+    fn states(&self) -> postcard::Result<Vec<u8>>;
+}
+
+#[derive(Debug)]
+struct Rowed<M: SoilModel> {
+    model: M,
+    states: Vec<M::State>,
+}
+
+impl<M: SoilModel> Plastic for Rowed<M> {
+    fn step(
+        &mut self,
+        threaded: bool,
+        flowing: Flowing<'_>,
+        first_row: usize,
+        (a, b): (&mut [StressPoint], &mut [NodalShare]),
+        outcomes: &mut [Outcome],
+        integrator: &Integrator,
+    ) {
+        let model = &self.model;
+        let Flowing { geometry, velocity, filter, dt, largest_step, with_after } = flowing;
+        for_each_chunk(threaded, Rows { a, b, c: &mut self.states }, outcomes, |first, rows, outcome| {
+            *outcome = Outcome::default();
+            for k in 0..rows.a.len() {
+                let (point, state) = (&mut rows.a[k], &mut rows.c[k]);
+                let s = first_row + first + k;
+                let motion = motion(geometry, s, velocity);
+                let increment = motion.advance(&mut point.deformation, dt);
+                match bounded(&increment, largest_step)
+                    .and_then(|()| model.update(state, &increment, integrator))
+                {
+                    Ok(report) => outcome.report.merge(&report),
+                    Err(error) => {
+                        outcome.failure = Some((s, error));
+                        return;
+                    }
+                }
+                let before = std::mem::replace(&mut point.stress, model.stress(state));
+                outcome.work.add(&before, point, &increment, with_after);
+                set_moduli(point, model.moduli(state));
+                add_strain(point, &increment);
+                rows.b[k] = motion.share(point, geometry.covariance[s], filter);
+            }
+        });
+    }
+
+    fn void_ratio(&self, row: usize) -> Option<f64> {
+        self.model.void_ratio(&self.states[row])
+    }
+
+    fn points(&self) -> usize {
+        self.states.len()
+    }
+
+    fn state_bytes(&self) -> usize {
+        size_of_val(self.states.as_slice())
+    }
+
+    fn states(&self) -> postcard::Result<Vec<u8>> {
+        postcard::to_stdvec(&self.states)
+    }
+}
+
+/// Largest strain component of one step: a thousand times what an earthquake does, and far below what plasticity
+/// would need minutes to follow. Beyond it the run has diverged.
+const LARGEST_STEP: f64 = 0.02;
+/// The same of ground that flows: where a few grains touch, a step may turn them over.
+const LARGEST_FLOWING_STEP: f64 = 0.5;
+/// Refuses the strain of a diverging run before the soil model goes through it.
+fn bounded(increment: &StrainIncrement, limit: f64) -> Result<(), SoilError> {
+    let value = increment.xx.abs().max(increment.yy.abs()).max(increment.xy.abs());
+    // NaN goes on to the model, which names it.
+    if value > limit {
+        return Err(SoilError::StrainIncrementTooLarge { value, limit });
+    }
+    Ok(())
+}
+
+fn stiffness(moduli: Moduli) -> f64 {
+    moduli.bulk + 4.0 / 3.0 * moduli.shear
+}
+
+/// Contiguous stress-node rows of each region; nodes are sorted by region.
+fn groups(model: &Model) -> Vec<(usize, Range<usize>)> {
+    let mut groups: Vec<(usize, Range<usize>)> = Vec::new();
+    for (node, &region) in model.region.iter().enumerate() {
+        let rows = STRESS_NODES * node..STRESS_NODES * (node + 1);
+        match groups.last_mut() {
+            Some((last, span)) if *last == region as usize => span.end = rows.end,
+            _ => groups.push((region as usize, rows)),
+        }
+    }
+    groups
+}
+
+impl SoilField {
+    /// Statics: every soil elastic, with its static Poisson's ratio.
+    ///
+    /// # Errors
+    /// [`SolverError::Soil`] where an elastic constant is outside its range.
+    pub fn elastic(model: &Model, points: &mut [StressPoint]) -> Result<Self, SolverError> {
+        Self::build(model, |region, rows| {
+            let soil = &model.regions[region];
+            let law = Elastic::from_poisson(soil.soil.static_shear_modulus(), soil.static_poisson_ratio);
+            let law =
+                law.map_err(|source| SolverError::Soil { region, node: rows.start / STRESS_NODES, source })?;
+            for point in &mut points[rows] {
+                set_moduli(point, law.constants());
+            }
+            Ok(Law::Elastic(law))
+        })
+    }
+
+    /// Dynamics: every region's own model, its state made from the stress that is there and a void ratio common to
+    /// all, or the model's own.
+    ///
+    /// # Errors
+    /// [`SolverError::Soil`] where a model refuses the stress.
+    pub fn plastic(
+        model: &Model,
+        points: &mut [StressPoint],
+        void_ratio: Option<f64>,
+    ) -> Result<Self, SolverError> {
+        let mut inadmissible_starts = 0;
+        let field = Self::build(model, |region, rows| {
+            let soil = &model.regions[region].soil;
+            let Soil::Elastic(elastic) = soil else {
+                let (rows, replaced) =
+                    with_model!(soil, law => plastic_rows(law, region, rows, points, void_ratio)?);
+                inadmissible_starts += replaced;
+                return Ok(Law::Plastic(soil.clone(), rows));
+            };
+            for point in &mut points[rows] {
+                set_moduli(point, elastic.constants());
+            }
+            Ok(Law::Elastic(*elastic))
+        })?;
+        Ok(Self { inadmissible_starts, ..field })
+    }
+
+    fn build(
+        model: &Model,
+        mut law: impl FnMut(usize, Range<usize>) -> Result<Law, SolverError>,
+    ) -> Result<Self, SolverError> {
+        let groups = groups(model)
+            .into_iter()
+            .map(|(region, rows)| Ok(Group { region, law: law(region, rows.clone())?, rows }))
+            .collect::<Result<Vec<_>, SolverError>>()?;
+        let longest = groups.iter().map(|group| group.rows.len()).max().unwrap_or(0);
+        let outcomes = vec![Outcome::default(); chunks(longest)];
+        Ok(Self { groups, inadmissible_starts: 0, outcomes, largest_step: LARGEST_STEP })
+    }
+
+    /// Lets the soil flow.
+    pub fn let_flow(&mut self) {
+        self.largest_step = LARGEST_FLOWING_STEP;
+    }
+
+    /// Moves every stress node through one step: strain from the velocity field, stress from the soil model,
+    /// and the share that the force loop will gather. Returns what the models counted and what the stress did,
+    /// `with_after` also with the stress after the step.
+    ///
+    /// # Errors
+    /// [`SolverError::Soil`] with the first node, in order, whose model failed.
+    pub fn step(
+        &mut self,
+        threaded: bool,
+        geometry: &Geometry,
+        velocity: &[Vec2],
+        (points, shares): (&mut [StressPoint], &mut [NodalShare]),
+        (filter, dt): (f64, f64),
+        (integrator, with_after): (&Integrator, bool),
+    ) -> Result<(UpdateReport, StressWork), SolverError> {
+        let (mut total, mut work) = (UpdateReport::default(), StressWork::default());
+        for group in &mut self.groups {
+            let first_row = group.rows.start;
+            let used = chunks(group.rows.len());
+            if self.outcomes.len() < used {
+                self.outcomes.resize(used, Outcome::default());
+            }
+            let outcomes = &mut self.outcomes[..used];
+            let a = &mut points[group.rows.clone()];
+            let b = &mut shares[group.rows.clone()];
+            match &mut group.law {
+                Law::Elastic(elastic) => {
+                    // A slice of nothing, which takes no memory: the loop writes two arrays.
+                    let c = &mut vec![(); a.len()];
+                    for_each_chunk(threaded, Rows { a, b, c }, outcomes, |first, rows, outcome| {
+                        let mut work = StressWork::default();
+                        for (k, (point, share)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
+                            let s = first_row + first + k;
+                            let motion = motion(geometry, s, velocity);
+                            let increment = motion.advance(&mut point.deformation, dt);
+                            let before = point.stress;
+                            point.stress = elastic.moved(&before, &increment);
+                            work.add(&before, point, &increment, with_after);
+                            add_strain(point, &increment);
+                            *share = motion.share(point, geometry.covariance[s], filter);
+                        }
+                        *outcome = Outcome { work, ..Outcome::default() };
+                    });
+                }
+                Law::Plastic(_, law) => {
+                    let flowing = Flowing {
+                        geometry,
+                        velocity,
+                        filter,
+                        dt,
+                        largest_step: self.largest_step,
+                        with_after,
+                    };
+                    law.step(threaded, flowing, first_row, (a, b), outcomes, integrator);
+                    for outcome in &*outcomes {
+                        if let Some((s, source)) = &outcome.failure {
+                            let (region, node) = (group.region, s / STRESS_NODES);
+                            return Err(SolverError::Soil { region, node, source: source.clone() });
+                        }
+                        total.merge(&outcome.report);
+                    }
+                }
+            }
+            // In order, whatever thread made them.
+            for outcome in &*outcomes {
+                work.merge(&outcome.work);
+            }
+        }
+        Ok((total, work))
+    }
+
+    /// Void ratio at stress node `s`, if its model knows it.
+    pub fn void_ratio(&self, s: usize) -> Option<f64> {
+        let group = self.groups.iter().find(|group| group.rows.contains(&s))?;
+        match &group.law {
+            Law::Elastic(_) => None,
+            Law::Plastic(_, law) => law.void_ratio(s - group.rows.start),
+        }
+    }
+
+    fn plastic_groups(&self) -> impl Iterator<Item = &dyn Plastic> {
+        self.groups.iter().filter_map(|group| match &group.law {
+            Law::Elastic(_) => None,
+            Law::Plastic(_, law) => Some(&**law),
+        })
+    }
+
+    /// Stress nodes whose soil could not carry the stress they began with, and took the nearest that it can.
+    pub fn inadmissible_starts(&self) -> u64 {
+        self.inadmissible_starts
+    }
+
+    /// Stress nodes that run a plastic model.
+    pub fn plastic_points(&self) -> usize {
+        self.plastic_groups().map(Plastic::points).sum()
+    }
+
+    /// Bytes of the plastic models' history variables.
+    pub fn state_bytes(&self) -> usize {
+        self.plastic_groups().map(Plastic::state_bytes).sum()
+    }
+}
+
+/// States of one region's rows, and the stress and stiffness they give their points; and how many of them could not
+/// carry their stress.
+fn plastic_rows<M: SoilModel + 'static>(
+    law: &M,
+    region: usize,
+    rows: Range<usize>,
+    points: &mut [StressPoint],
+    void_ratio: Option<f64>,
+) -> Result<(Box<dyn Plastic>, u64), SolverError> {
+    let mut states = Vec::with_capacity(rows.len());
+    let mut replaced = 0;
+    for s in rows {
+        replaced += u64::from(!law.carries(&points[s].stress));
+        let state = law.initialise(points[s].stress, void_ratio).map_err(|source| SolverError::Soil {
+            region,
+            node: s / STRESS_NODES,
+            source,
+        })?;
+        points[s].stress = law.stress(&state);
+        set_moduli(&mut points[s], law.moduli(&state));
+        states.push(state);
+    }
+    Ok((Box::new(Rowed { model: law.clone(), states }), replaced))
+}
+
+fn restored_rows<M: SoilModel + 'static>(law: &M, states: &[u8]) -> postcard::Result<Box<dyn Plastic>> {
+    Ok(Box::new(Rowed { model: law.clone(), states: postcard::from_bytes(states)? }))
+}
+
+fn set_moduli(point: &mut StressPoint, moduli: Moduli) {
+    point.shear_modulus = moduli.shear;
+    point.stiffness = stiffness(moduli);
+}
+
+fn add_strain(point: &mut StressPoint, increment: &StrainIncrement) {
+    point.strain[0] += increment.xx;
+    point.strain[1] += increment.yy;
+    point.strain[2] += increment.xy;
+}

@@ -1,0 +1,121 @@
+//! Artificial viscosity of Monaghan (1983, J. Comput. Phys. 52, 374-389): brakes nodes that approach each other, so that
+//! they do not pair up. The forces act along the line between two nodes, keep both momenta and only take energy.
+
+use crate::{
+    parallel::{Rows, chunks, for_each_chunk},
+    section::description::{Model, STRESS_NODES},
+    skeleton::point::StressPoint,
+    weights::geometry::Geometry,
+};
+use sandboil_sph::{Vec2, WendlandQuintic};
+
+/// Keeps the approach of two nodes that meet finite, in squares of the smoothing length (Monaghan 1983).
+pub const SOFTENING: f64 = 0.01;
+/// Viscous forces of the present motion.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+pub struct Viscosity {
+    coefficient: f64,
+    force: Vec<Vec2>,
+}
+
+impl Viscosity {
+    /// None yet.
+    pub fn new(coefficient: f64, nodes: usize) -> Self {
+        Self { coefficient, force: vec![Vec2::zeros(); nodes] }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.force.as_slice())
+    }
+
+    /// Coefficient `alpha`.
+    pub fn coefficient(&self) -> f64 {
+        self.coefficient
+    }
+
+    /// Force on node `j`, kN/m.
+    #[inline]
+    pub fn force(&self, j: usize) -> Vec2 {
+        self.force[j]
+    }
+
+    /// Gathers the forces of all nodes at `position` (m) moving at `velocity` (m/s), with volumes in m2.
+    pub fn update(
+        &mut self,
+        threaded: bool,
+        (model, geometry): (&Model, &Geometry),
+        points: &[StressPoint],
+        (position, velocity, volume): (&[Vec2], &[Vec2], &[f64]),
+    ) {
+        let kernel = WendlandQuintic::new(model.smoothing_length());
+        let h = kernel.smoothing_length();
+        let least = SOFTENING * h * h;
+        // Of the skeleton: water does not make it more viscous.
+        let impedance = |node: usize| {
+            let point = &points[STRESS_NODES * node];
+            (point.stiffness * point.density).sqrt()
+        };
+        let strength = 0.5 * self.coefficient * h;
+        let mut unit = [vec![(); position.len()], vec![(); position.len()]];
+        let [b, c] = &mut unit;
+        let rows = Rows { a: &mut self.force, b, c };
+        for_each_chunk(threaded, rows, &mut vec![(); chunks(position.len())], |first, rows, ()| {
+            for (k, force) in rows.a.iter_mut().enumerate() {
+                let i = first + k;
+                *force = Vec2::zeros();
+                for (j, shift) in geometry.lists().nodes_near(i) {
+                    let mut offset = position[j] - position[i];
+                    offset.x += shift * model.period.map_or(0.0, |period| period.width);
+                    let approach = (velocity[j] - velocity[i]).dot(&offset);
+                    if i == j || approach >= 0.0 {
+                        continue;
+                    }
+                    let rate = approach / (offset.norm_squared() + least);
+                    let pair = volume[i] * volume[j] * strength * (impedance(i) + impedance(j));
+                    *force += kernel.gradient(offset) * (pair * rate);
+                }
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{section::outline::Walls, testing::square_block};
+    use proptest::prelude::*;
+
+    const SIDE: usize = 5;
+
+    proptest! {
+        /// Viscous forces keep both momenta, take energy and never give any, and leave alone what parts.
+        #[test]
+        fn viscosity_only_takes_energy(
+            places in prop::collection::vec((-0.3_f64..0.3, -0.3_f64..0.3), SIDE * SIDE),
+            velocities in prop::collection::vec((-1.0_f64..1.0, -1.0_f64..1.0), SIDE * SIDE),
+        ) {
+            let mut model = square_block(SIDE);
+            for (at, (x, y)) in model.position.iter_mut().zip(places) {
+                *at += Vec2::new(x, y);
+            }
+            let velocity: Vec<Vec2> = velocities.into_iter().map(|(x, y)| Vec2::new(x, y)).collect();
+            let volume = vec![1.0; SIDE * SIDE];
+            let edges = (&model.outline, Walls::statics(&model.outline));
+            let geometry = Geometry::build(&model, &model.position, &volume, edges, None);
+            let points = vec![StressPoint { stiffness: 4.0, density: 1.0, ..StressPoint::default() }; 2 * SIDE * SIDE];
+            let mut viscosity = Viscosity::new(0.1, SIDE * SIDE);
+            let mut forces = |velocity: &[Vec2]| {
+                viscosity.update(false, (&model, &geometry), &points, (&model.position, velocity, &volume));
+                viscosity.force.clone()
+            };
+            let force = forces(&velocity);
+            let total: Vec2 = force.iter().sum();
+            let moment: f64 = force.iter().zip(&model.position).map(|(f, x)| x.perp(f)).sum();
+            let power: f64 = force.iter().zip(&velocity).map(|(f, v)| f.dot(v)).sum();
+            prop_assert!(total.norm() < 1e-12 && moment.abs() < 1e-12, "{total} {moment}");
+            prop_assert!(power < 0.0, "{power}");
+            prop_assert!(forces(&model.position).iter().all(|force| force.norm() == 0.0));
+        }
+    }
+}

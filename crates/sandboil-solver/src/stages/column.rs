@@ -1,0 +1,404 @@
+//! The ground beyond a free-field side: a column one node wide, its own image on both sides. It is solved step by step
+//! with the section, or read from the record of an earlier run.
+
+use crate::{
+    edges::base::Impedance,
+    error::SolverError,
+    run::simulation::{Gravity, Shaking, Simulation},
+    section::description::{Model, STRESS_NODES},
+};
+use sandboil_sph::Vec2;
+
+/// Components of a nominal stress `[xx, xy, yx, yy]`.
+const COMPONENTS: usize = 4;
+/// What a section reads of its column in a step. Rows count from below.
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
+pub struct Present {
+    /// Nominal effective stress of both stress nodes of every row at the step's beginning, kPa.
+    pub stress: Vec<[f64; COMPONENTS]>,
+    /// Nominal excess pore pressure of every row, `q J F^-T`, kPa; empty without water.
+    pub water: Vec<[f64; COMPONENTS]>,
+    /// Velocity of every row half a step before, m/s.
+    pub velocity_before: Vec<Vec2>,
+    /// Velocity of every row half a step after, m/s.
+    pub velocity: Vec<Vec2>,
+    /// Acceleration of every row, m/s2.
+    pub acceleration: Vec<Vec2>,
+    /// Mean traction of the compliant base over the step, kPa.
+    pub base_traction: Vec2,
+}
+
+impl Present {
+    fn of_rows(rows: usize, wet: bool) -> Self {
+        let still = vec![Vec2::zeros(); rows];
+        Self {
+            stress: vec![[0.0; COMPONENTS]; STRESS_NODES * rows],
+            water: vec![[0.0; COMPONENTS]; if wet { rows } else { 0 }],
+            velocity_before: still.clone(),
+            velocity: still.clone(),
+            acceleration: still,
+            base_traction: Vec2::zeros(),
+        }
+    }
+}
+
+/// What a column did in a stage, to be read again by a section with the same column under the same motion.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ColumnRecord {
+    /// Time between frames, s, the first at the stage's beginning; straight between them.
+    pub interval: f64,
+    /// Density and small-strain wave speeds of every row from below, when the stage began.
+    pub impedance: Vec<Impedance>,
+    /// Whether pore pressure is among the values.
+    pub wet: bool,
+    /// Frame after frame: increments of nominal stress of every stress node, of nominal pore pressure and velocity of
+    /// every row, and the base's traction.
+    pub values: Vec<f64>,
+}
+
+impl ColumnRecord {
+    /// Values of a frame of a column of `rows` rows.
+    pub fn width(rows: usize, wet: bool) -> usize {
+        let per_row = STRESS_NODES * COMPONENTS + if wet { COMPONENTS } else { 0 } + 2;
+        per_row * rows + 2
+    }
+
+    fn rows(&self) -> usize {
+        self.impedance.len()
+    }
+
+    /// Refuses what is no record of a column of `rows` rows over `duration` s.
+    ///
+    /// # Errors
+    /// The first of its figures that does not fit.
+    pub fn validate(&self, rows: usize, wet: bool, duration: f64) -> Result<(), SolverError> {
+        if self.rows() != rows || self.wet != wet {
+            let (found, expected) = (self.rows(), rows);
+            return Err(SolverError::Shape { name: "column_record", found, expected });
+        }
+        let width = Self::width(rows, wet);
+        let frames = self.values.len() / width;
+        let covered = self.interval * frames.saturating_sub(1) as f64;
+        if !self.values.len().is_multiple_of(width) || !(covered >= duration) {
+            let (name, value) = ("column_record", covered);
+            return Err(SolverError::InvalidInput { name, value, expected: "as long as the stage, in s" });
+        }
+        if let Some(&value) = self.values.iter().find(|value| !value.is_finite()) {
+            return Err(SolverError::InvalidInput { name: "column_record", value, expected: "finite" });
+        }
+        Ok(())
+    }
+
+    /// Values of a frame at any time, held after the last one.
+    fn at(&self, time: f64, into: &mut [f64]) {
+        let width = into.len();
+        let place = (time / self.interval).max(0.0);
+        let last = self.values.len() / width - 1;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a frame's number, not negative
+        let before = (place.floor() as usize).min(last);
+        let after = (before + 1).min(last);
+        let fraction = (place - before as f64).min(1.0);
+        let (from, to) = (&self.values[width * before..][..width], &self.values[width * after..][..width]);
+        for ((value, from), to) in into.iter_mut().zip(from).zip(to) {
+            *value = from + fraction * (to - from);
+        }
+    }
+}
+
+/// A column and what a section reads of it.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+pub struct Column {
+    source: Source,
+    present: Present,
+    recorder: Option<Recorder>,
+}
+
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+enum Source {
+    Solved {
+        simulation: Box<Simulation>,
+        /// Internal index of the node of each row, from below.
+        rows: Vec<usize>,
+    },
+    Recorded {
+        record: ColumnRecord,
+        time: f64,
+        frame: Vec<f64>,
+    },
+}
+
+impl Column {
+    /// A column at rest.
+    ///
+    /// # Errors
+    /// A column that finds no rest.
+    pub fn at_rest(model: &Model, gravity: Option<Gravity>) -> Result<Self, SolverError> {
+        let mut simulation = Simulation::new(model, 1)?;
+        if let Some(gravity) = gravity {
+            simulation.begin_gravity(gravity)?;
+            simulation.advance(u64::MAX, f64::INFINITY)?;
+        }
+        let rows = simulation.internal_order();
+        let present = Present::of_rows(rows.len(), model.water.is_some());
+        let source = Source::Solved { simulation: Box::new(simulation), rows };
+        Ok(Self { source, present, recorder: None })
+    }
+
+    /// A column that does what it did before.
+    pub fn recorded(record: ColumnRecord) -> Self {
+        let (rows, wet) = (record.rows(), record.wet);
+        let frame = vec![0.0; ColumnRecord::width(rows, wet)];
+        let source = Source::Recorded { record, time: 0.0, frame };
+        Self { source, present: Present::of_rows(rows, wet), recorder: None }
+    }
+
+    /// Begins a stage. With an interval (s) what the column does is recorded. A column that is read goes on with the
+    /// stage's own record.
+    ///
+    /// # Errors
+    /// Soil that refuses its stress, or a record of another column, too short or missing.
+    pub fn begin_shaking(
+        &mut self,
+        stage: Shaking,
+        record: Option<&ColumnRecord>,
+        record_interval: Option<f64>,
+    ) -> Result<(), SolverError> {
+        let (rows, wet) = (self.rows(), !self.present.water.is_empty());
+        match &mut self.source {
+            Source::Solved { simulation, .. } => simulation.begin_shaking(stage)?,
+            Source::Recorded { record: read, time, .. } => {
+                let Some(record) = record else {
+                    return Err(SolverError::Order {
+                        call: "begin_shaking",
+                        needs: "a record of the stage for columns that are read",
+                    });
+                };
+                record.validate(rows, wet, stage.duration)?;
+                (*read, *time) = (record.clone(), 0.0);
+            }
+        }
+        self.observe();
+        self.recorder = match (record_interval, &self.source) {
+            (Some(interval), Source::Solved { .. }) => {
+                Some(Recorder::new(interval, self.impedance()?, &self.present))
+            }
+            _ => None,
+        };
+        Ok(())
+    }
+
+    /// What a section reads.
+    pub fn present(&self) -> &Present {
+        &self.present
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.present.velocity.len()
+    }
+
+    /// Density and small-strain wave speeds of every row, from below.
+    ///
+    /// # Errors
+    /// Soil that refuses its stress.
+    pub fn impedance(&self) -> Result<Vec<Impedance>, SolverError> {
+        match &self.source {
+            Source::Solved { simulation, rows } => {
+                rows.iter().map(|&row| simulation.small_strain_impedance(row)).collect()
+            }
+            Source::Recorded { record, .. } => Ok(record.impedance.clone()),
+        }
+    }
+
+    /// The simulation of a column that is solved.
+    pub fn simulation(&self) -> Option<&Simulation> {
+        match &self.source {
+            Source::Solved { simulation, .. } => Some(simulation),
+            Source::Recorded { .. } => None,
+        }
+    }
+
+    /// Gives every row an excess pore pressure, kPa, held in balance.
+    pub fn set_excess(&mut self, excess: impl Iterator<Item = f64>) {
+        if let Source::Solved { simulation, rows } = &mut self.source {
+            for (&row, excess) in rows.iter().zip(excess) {
+                simulation.set_excess_at(row, excess);
+            }
+            simulation.store_load();
+        }
+        self.observe();
+    }
+
+    /// Builds the column's geometry anew where its nodes now are.
+    pub fn renew_geometry(&mut self) {
+        self.observe();
+        let before = self.present.clone();
+        if let Source::Solved { simulation, .. } = &mut self.source {
+            simulation.renew_geometry(None);
+        }
+        self.observe();
+        if let Some(recorder) = &mut self.recorder {
+            recorder.carry_over(&before, &self.present);
+        }
+    }
+
+    /// Reads stress and pressure at the beginning of a step.
+    pub fn observe(&mut self) {
+        let Present { stress, water, .. } = &mut self.present;
+        match &mut self.source {
+            Source::Solved { simulation, rows } => {
+                for (row, &node) in rows.iter().enumerate() {
+                    for k in 0..STRESS_NODES {
+                        stress[STRESS_NODES * row + k] = simulation.nominal_stress(STRESS_NODES * node + k);
+                    }
+                    if let Some(water) = water.get_mut(row) {
+                        *water = simulation.nominal_water(node);
+                    }
+                }
+            }
+            Source::Recorded { record, time, frame } => {
+                record.at(*time, frame);
+                let mut values = frame.chunks_exact(COMPONENTS);
+                for (slot, value) in stress.iter_mut().chain(water).zip(&mut values) {
+                    slot.copy_from_slice(value);
+                }
+            }
+        }
+    }
+
+    /// Makes the step of `dt` seconds whose beginning has been observed.
+    ///
+    /// # Errors
+    /// A column that has diverged.
+    pub fn step(&mut self, dt: f64) -> Result<(), SolverError> {
+        let Present { velocity_before, velocity, acceleration, base_traction, stress, water } =
+            &mut self.present;
+        std::mem::swap(velocity_before, velocity);
+        match &mut self.source {
+            Source::Solved { simulation, rows } => {
+                let time = simulation.time();
+                simulation.column_step(dt)?;
+                for (row, &node) in rows.iter().enumerate() {
+                    velocity[row] = simulation.velocity_of(node);
+                    acceleration[row] = simulation.acceleration_of(node);
+                }
+                *base_traction = simulation.base_traction();
+                if let Some(recorder) = &mut self.recorder {
+                    recorder.push(time, &self.present);
+                }
+            }
+            Source::Recorded { record, time, frame } => {
+                // The first values of the frame are read at the step's beginning, its motion half a step later.
+                let motion = COMPONENTS * (stress.len() + water.len());
+                *base_traction = Vec2::new(frame[frame.len() - 2], frame[frame.len() - 1]);
+                record.at(*time + 0.5 * dt, frame);
+                for (row, value) in frame[motion..].chunks_exact(2).take(velocity.len()).enumerate() {
+                    velocity[row] = Vec2::new(value[0], value[1]);
+                    acceleration[row] = (velocity[row] - velocity_before[row]) / dt;
+                }
+                *time += dt;
+            }
+        }
+        Ok(())
+    }
+
+    /// The record of the stage so far, if it is kept.
+    pub fn take_record(&mut self) -> Option<ColumnRecord> {
+        self.recorder.take().map(Recorder::closed)
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let source = match &self.source {
+            Source::Solved { simulation, .. } => simulation.arrays().iter().map(|(_, bytes)| bytes).sum(),
+            Source::Recorded { record, .. } => size_of_val(record.values.as_slice()),
+        };
+        let recorded = self.recorder.as_ref().map_or(0, |r| size_of_val(r.record.values.as_slice()));
+        source + recorded
+    }
+}
+
+/// Frames of a column under way.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+struct Recorder {
+    record: ColumnRecord,
+    /// Values from which increments count; at a renewal of the geometry they take over its change of frame.
+    origin: Vec<f64>,
+    /// Time (s) and values of the last step.
+    last: (f64, Vec<f64>),
+    sample: Vec<f64>,
+    frames: usize,
+}
+
+impl Recorder {
+    fn new(interval: f64, impedance: Vec<Impedance>, present: &Present) -> Self {
+        let (rows, wet) = (impedance.len(), !present.water.is_empty());
+        let width = ColumnRecord::width(rows, wet);
+        let mut origin = vec![0.0; width];
+        flatten(present, &mut origin);
+        // Motion and traction are recorded as they are.
+        origin[COMPONENTS * (present.stress.len() + present.water.len())..].fill(0.0);
+        let record = ColumnRecord { interval, impedance, wet, values: Vec::new() };
+        Self { record, origin, last: (0.0, vec![0.0; width]), sample: vec![0.0; width], frames: 0 }
+    }
+
+    fn carry_over(&mut self, before: &Present, after: &Present) {
+        let count = COMPONENTS * (before.stress.len() + before.water.len());
+        let parts = |present: &Present| -> Vec<f64> {
+            present.stress.iter().chain(&present.water).flatten().copied().collect()
+        };
+        for ((origin, before), after) in self.origin[..count].iter_mut().zip(parts(before)).zip(parts(after))
+        {
+            *origin += after - before;
+        }
+    }
+
+    /// Takes the step that began at `time`, s.
+    fn push(&mut self, time: f64, present: &Present) {
+        flatten(present, &mut self.sample);
+        for (value, origin) in self.sample.iter_mut().zip(&self.origin) {
+            *value -= origin;
+        }
+        let (before, last) = &mut self.last;
+        while self.frames as f64 * self.record.interval <= time {
+            let at = self.frames as f64 * self.record.interval;
+            let fraction = if time > *before { (at - *before) / (time - *before) } else { 1.0 };
+            let between = last.iter().zip(&self.sample).map(|(last, now)| last + fraction * (now - last));
+            self.record.values.extend(between);
+            self.frames += 1;
+        }
+        *before = time;
+        last.copy_from_slice(&self.sample);
+    }
+
+    /// The record, with a frame after the last step: straight on from the last one through the last step's values. A
+    /// stage ends within half a step after those, so two frames at most.
+    fn closed(mut self) -> ColumnRecord {
+        let width = self.sample.len();
+        let (time, values) = &self.last;
+        if let Some(from) = self.record.values.len().checked_sub(width) {
+            let frame = self.record.values[from..].to_vec();
+            let since = time - (self.frames - 1) as f64 * self.record.interval;
+            for ahead in [1.0, 2.0] {
+                let factor = if since > 0.0 { ahead * self.record.interval / since } else { 0.0 };
+                let further = frame.iter().zip(values).map(|(frame, value)| frame + factor * (value - frame));
+                self.record.values.extend(further);
+            }
+        }
+        self.record
+    }
+}
+
+/// Writes a frame: stress, water, velocity at the step's beginning, traction.
+fn flatten(present: &Present, into: &mut [f64]) {
+    let tensors = present.stress.iter().chain(&present.water).flatten().copied();
+    let motion = present.velocity_before.iter().zip(&present.velocity);
+    let motion = motion.flat_map(|(before, after)| {
+        let mean = 0.5 * (before + after);
+        [mean.x, mean.y]
+    });
+    let traction = [present.base_traction.x, present.base_traction.y];
+    for (slot, value) in into.iter_mut().zip(tensors.chain(motion).chain(traction)) {
+        *slot = value;
+    }
+}

@@ -1,0 +1,724 @@
+//! Flow of pore water through a skeleton at rest: Eq. 3 without its velocity, saturated or not.
+//!
+//! In time: backward Euler in the mixed form, which keeps the water content itself, so that no water is lost however
+//! long the steps (Celia, Bouloutas and Zarba 1990, Water Resour. Res. 26). A steady state knows no storage: it is
+//! found without time, by solving for the heads and following them with the conductivities.
+
+use crate::{
+    error::SolverError,
+    linear::{banded::BandedLu, conjugate_gradients::conjugate_gradients},
+    section::{
+        description::{Model, STRESS_NODES, Water, positive},
+        node_id::id,
+        order::sorted,
+    },
+    water::{
+        conditions::{Cell, Cells, Demand, HydraulicBoundary},
+        conduction::{Conduction, Rows, between, collected, static_conduction},
+    },
+};
+use sandboil_soil::{Moisture, VanGenuchten};
+use sandboil_sph::Vec2;
+
+/// Change of head in an iteration at which a step is solved, in spacings: Newton's next would be its square.
+pub const HEAD_TOLERANCE: f64 = 1e-6;
+/// Iterations, inner or outer, after which a step is tried anew, shorter.
+pub const MOST_ITERATIONS: u32 = 50;
+/// Iterations along the retention curve itself after which a step is solved by the nested ones.
+pub const DIRECT_ITERATIONS: u32 = 12;
+/// Change of the degree of saturation anywhere that a transient step aims at: conductivities lag by one step.
+pub const SATURATION_CHANGE: f64 = 0.05;
+/// Change over the aim beyond which a step is taken back.
+pub const REJECTED_CHANGE: f64 = 3.0;
+/// Growth of a transient step: faster growth overshoots fronts and has to go back.
+pub const GROWTH: f64 = 1.5;
+/// What is left at least of a step that changed too much, or could not be solved.
+pub const CUT: f64 = 0.4;
+/// Switches of a cell within one step after which it stays as it is: two states that each call for the other differ by
+/// less than the tolerance of the iteration.
+pub const MOST_SWITCHES: u32 = 4;
+/// Share of a spacing's head by which a cell must miss its state before it changes it.
+pub const HYSTERESIS: f64 = 1e-6;
+/// Change of head in an iteration at which a state is steady, in spacings: flows then change in their sixth figure.
+pub const STEADY_TOLERANCE: f64 = 1e-3;
+/// Change of relative conductivity that a steady state may leave.
+pub const STEADY_CONDUCTIVITY: f64 = 1e-3;
+/// Iterations after which the search for a steady state gives up.
+pub const MOST_STEADY_ITERATIONS: u64 = 1000;
+/// Share of its change that a conductivity follows at first; conductivities that swing follow ever less, others more.
+pub const FOLLOWED: f64 = 0.5;
+/// Factor on the share of one that swings.
+pub const CALMED: f64 = 0.5;
+/// Factor on the share of one that does not.
+pub const TRUSTED: f64 = 1.1;
+/// Time over that in which the most permeable soil moves water by a spacing, in which even soil that lets nothing
+/// through keeps its pressure: it makes the equations of such soil solvable.
+pub const AGES: f64 = 1e9;
+/// Iterations of the conjugate gradients after which the preconditioner is made anew.
+pub const STALE_AFTER: usize = 25;
+/// Iterations after which a system has no solution: with fresh factors they go with the root of the anisotropy.
+pub const MOST_GRADIENTS: usize = 500;
+/// Residual of the conjugate gradients over that at their start: an iteration of a time step is to leave nothing.
+pub const STEP_TOLERANCE: f64 = 1e-10;
+/// The same on the way to a steady state, where the next iteration takes up what is left.
+pub const APPROACH_TOLERANCE: f64 = 1e-3;
+/// How far the flow goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Until {
+    /// For so long, s.
+    Time(f64),
+    /// Until nothing changes any more.
+    Steady,
+}
+
+/// Totals since the start.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct WaterBalance {
+    /// Inflow through each boundary, m3 per m.
+    pub inflow: Vec<f64>,
+    /// Increase of the stored water, m3 per m.
+    pub stored: f64,
+}
+
+/// Work done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SeepageCounters {
+    /// Steps.
+    pub steps: u64,
+    /// Steps tried and given up.
+    pub rejected: u64,
+    /// Iterations of all steps.
+    pub iterations: u64,
+    /// Evaluations of retention curves.
+    pub retention_calls: u64,
+    /// Factors made of the matrix.
+    pub factorings: u64,
+}
+
+/// Pore water of a section at rest. Arrays that leave are in the user's node order.
+#[derive(Debug)]
+pub struct Seepage {
+    water: Water,
+    order: Vec<usize>,
+    position: Vec<Vec2>,
+    spacing: f64,
+    volume: Vec<f64>,
+    porosity: Vec<f64>,
+    retention: Vec<Option<VanGenuchten>>,
+    conductivity: Vec<f64>,
+    conduction: Conduction,
+    boundaries: Vec<HydraulicBoundary>,
+    cells: Cells,
+    /// Whether a cell holds a head.
+    holds: Vec<bool>,
+    head: Vec<f64>,
+    moisture: Vec<Moisture>,
+    /// Inflow through each cell at the end of the last step, m2/s.
+    flow: Vec<f64>,
+    time: f64,
+    dt: f64,
+    following: Option<Following>,
+    balance: WaterBalance,
+    counters: SeepageCounters,
+    preconditioner: Option<BandedLu>,
+}
+
+/// Relative conductivities on their way to those of a steady state.
+#[derive(Debug, Clone)]
+pub struct Following {
+    relative: Vec<f64>,
+    /// Share of its change that each follows.
+    share: Vec<f64>,
+    /// Last change of each.
+    change: Vec<f64>,
+    arrived: bool,
+}
+
+/// The state at the beginning of a step, s long, and its end, s.
+pub struct Begun {
+    head: Vec<f64>,
+    moisture: Vec<Moisture>,
+    relative: Vec<f64>,
+    dt: f64,
+    end: f64,
+}
+
+/// A linear system of one iteration: inflow of node `i` is `sum_j a_ij H_j + constant_i`, m2/s.
+pub struct Inflow {
+    rows: Rows,
+    constant: Vec<f64>,
+}
+
+impl Seepage {
+    /// The section of a model at the given pore pressures (kPa, user's order), under conditions on its edges.
+    ///
+    /// # Errors
+    /// Bad input, a dry model.
+    pub fn new(
+        model: &Model,
+        pore_pressure: &[f64],
+        boundaries: Vec<HydraulicBoundary>,
+    ) -> Result<Self, SolverError> {
+        model.validate()?;
+        let Some(water) = model.water else {
+            return Err(SolverError::Order { call: "seepage", needs: "a model with water" });
+        };
+        let (found, expected) = (pore_pressure.len(), model.nodes());
+        if found != expected {
+            return Err(SolverError::Shape { name: "pore_pressure", found, expected });
+        }
+        let (model, order) = sorted(model);
+        let conduction = static_conduction(&model);
+        let cells = Cells::new(&model, &model.position, &boundaries, conduction.beyond())?;
+        let of_region = |value: &dyn Fn(&crate::Region) -> f64| -> Vec<f64> {
+            model.region.iter().map(|&region| value(&model.regions[region as usize])).collect()
+        };
+        let head = order
+            .iter()
+            .zip(&model.position)
+            .map(|(&user, at)| at.y + pore_pressure[user] / water.unit_weight);
+        let mut seepage = Self {
+            water,
+            spacing: model.spacing.y,
+            volume: model.volume.clone(),
+            porosity: of_region(&|region| region.porosity),
+            conductivity: of_region(&|region| region.hydraulic_conductivity.minor),
+            retention: model.region.iter().map(|&region| model.regions[region as usize].retention).collect(),
+            holds: vec![false; cells.all.len()],
+            flow: vec![0.0; cells.all.len()],
+            head: head.collect(),
+            moisture: vec![Moisture::SATURATED; model.nodes()],
+            time: 0.0,
+            dt: 0.0,
+            following: None,
+            balance: WaterBalance { inflow: vec![0.0; boundaries.len()], stored: 0.0 },
+            counters: SeepageCounters::default(),
+            preconditioner: None,
+            position: model.position,
+            order,
+            conduction,
+            boundaries,
+            cells,
+        };
+        seepage.dt = seepage.first_step();
+        seepage.moisture = seepage.moisture_at(&seepage.head.clone());
+        seepage.begin_cells();
+        Ok(seepage)
+    }
+
+    /// A step in which the most permeable soil moves water by a spacing.
+    fn first_step(&self) -> f64 {
+        let fastest = self.conductivity.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        self.spacing / fastest
+    }
+
+    /// Goes on until the end or until `go_on`, asked after every step with their number, says no. Returns whether the end
+    /// is reached.
+    ///
+    /// # Errors
+    /// [`SolverError::Seepage`] when no step, however short, can be solved.
+    pub fn advance(&mut self, until: Until, mut go_on: impl FnMut(u64) -> bool) -> Result<bool, SolverError> {
+        if let Until::Time(end) = until {
+            positive("duration", end)?;
+        }
+        let mut begun = false;
+        loop {
+            let arrived = match until {
+                Until::Time(end) => self.time >= end * (1.0 - f64::EPSILON),
+                Until::Steady => self.following.as_ref().is_some_and(|following| following.arrived),
+            };
+            if arrived || (begun && !go_on(self.counters.steps)) {
+                return Ok(arrived);
+            }
+            match until {
+                Until::Time(end) => self.step(end - self.time)?,
+                Until::Steady => self.approach_steady()?,
+            }
+            begun = true;
+        }
+    }
+
+    /// Heads for the present conductivities without storage, and conductivities that follow them.
+    fn approach_steady(&mut self) -> Result<(), SolverError> {
+        let nodes = self.head.len();
+        let mut following = self.following.take().unwrap_or_else(|| Following {
+            relative: self.moisture.iter().map(|moisture| moisture.relative_conductivity).collect(),
+            share: vec![FOLLOWED; nodes],
+            change: vec![0.0; nodes],
+            arrived: false,
+        });
+        let failed = |reason| SolverError::Seepage { time: self.time, reason };
+        let (not_found, unsolved) =
+            (failed("no steady state is found"), failed("the heads cannot be solved for"));
+        if self.counters.steps > MOST_STEADY_ITERATIONS {
+            return Err(not_found);
+        }
+        let before = self.head.clone();
+        let mut switches = vec![0_u32; self.holds.len()];
+        let ages = AGES * self.first_step();
+        let storage: Vec<f64> =
+            (0..nodes).map(|i| self.compressibility(i, &Moisture::SATURATED) / ages).collect();
+        for _ in 0..MOST_ITERATIONS {
+            let mut inflow = self.inflow(0.0, &following.relative);
+            let along = self.flow_along(&following.relative, &self.head);
+            for ((left, row), along) in inflow.constant.iter_mut().zip(&inflow.rows).zip(along) {
+                *left += along + row.iter().map(|&(j, a)| a * self.head[j as usize]).sum::<f64>();
+            }
+            self.counters.iterations += 1;
+            let solved = self.solve_linear(
+                inflow.rows,
+                &following.relative,
+                &storage,
+                &inflow.constant,
+                APPROACH_TOLERANCE,
+            );
+            let change = solved.ok_or_else(|| unsolved.clone())?;
+            for (head, change) in self.head.iter_mut().zip(&change) {
+                *head += change;
+            }
+            // Between switches the heads follow from one linear system.
+            if !self.switch_cells(0.0, &following.relative, &mut switches) {
+                break;
+            }
+        }
+        self.inflow(0.0, &following.relative);
+        self.moisture = self.moisture_at(&self.head.clone());
+        let moved = self.head.iter().zip(&before).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+        following.arrived = moved <= STEADY_TOLERANCE * self.spacing;
+        for (i, moisture) in self.moisture.iter().enumerate() {
+            let wanted = moisture.relative_conductivity;
+            following.arrived &= (wanted - following.relative[i]).abs() <= STEADY_CONDUCTIVITY;
+            // Conductivities differ by orders of magnitude: they follow in proportion.
+            let change = (wanted / following.relative[i]).ln();
+            let factor = if change * following.change[i] < 0.0 { CALMED } else { TRUSTED };
+            following.share[i] = (following.share[i] * factor).min(1.0);
+            following.relative[i] *= (following.share[i] * change).exp();
+            following.change[i] = change;
+        }
+        self.following = Some(following);
+        self.counters.steps += 1;
+        Ok(())
+    }
+
+    /// One step of at most `left` seconds.
+    fn step(&mut self, left: f64) -> Result<(), SolverError> {
+        // Conditions change at the corners of their series: no step goes over one.
+        let corners = self.boundaries.iter().filter_map(|b| b.condition.next_after(self.time));
+        let longest = corners.map(|corner| corner - self.time).fold(left, f64::min);
+        let shortest = self.first_step() * f64::EPSILON;
+        loop {
+            let dt = self.dt.min(longest);
+            let before = (self.head.clone(), self.moisture.clone(), self.holds.clone());
+            let solved = self.solve(dt, self.time + dt).then(|| {
+                let change = |(now, then): (&Moisture, &Moisture)| (now.saturation - then.saturation).abs();
+                self.moisture.iter().zip(&before.1).map(change).fold(0.0, f64::max)
+            });
+            if let Some(change) = solved.filter(|change| *change <= REJECTED_CHANGE * SATURATION_CHANGE) {
+                for (cell, flow) in self.cells.all.iter().zip(&self.flow) {
+                    self.balance.inflow[cell.boundary] += flow * dt;
+                }
+                self.balance.stored +=
+                    (0..self.head.len()).map(|i| self.gained(i, &before.0, &before.1)).sum::<f64>();
+                self.time += dt;
+                self.counters.steps += 1;
+                let next = dt * (SATURATION_CHANGE / change.max(f64::MIN_POSITIVE)).clamp(CUT, GROWTH);
+                // A step cut short by a corner says nothing against longer ones.
+                self.dt = if dt < self.dt { next.max(self.dt) } else { next };
+                return Ok(());
+            }
+            (self.head, self.moisture, self.holds) = before;
+            self.counters.rejected += 1;
+            self.dt = dt * CUT;
+            if self.dt < shortest {
+                return Err(SolverError::Seepage { time: self.time, reason: "no step can be solved" });
+            }
+        }
+    }
+
+    /// Time since the start, s.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Total head of every node, m.
+    pub fn head(&self) -> Vec<f64> {
+        self.in_user_order(|i| self.head[i])
+    }
+
+    /// Pore pressure of every node, kPa, compression positive; suction is negative.
+    pub fn pore_pressure(&self) -> Vec<f64> {
+        self.in_user_order(|i| self.water.unit_weight * (self.head[i] - self.position[i].y))
+    }
+
+    /// Degree of saturation of every node.
+    pub fn saturation(&self) -> Vec<f64> {
+        self.in_user_order(|i| self.moisture[i].saturation)
+    }
+
+    fn in_user_order(&self, value: impl Fn(usize) -> f64) -> Vec<f64> {
+        let mut values = vec![0.0; self.order.len()];
+        for (i, &user) in self.order.iter().enumerate() {
+            values[user] = value(i);
+        }
+        values
+    }
+
+    /// Inflow through each boundary at the end of the last step, m3/s per m.
+    pub fn discharge(&self) -> Vec<f64> {
+        let mut discharge = vec![0.0; self.boundaries.len()];
+        for (cell, flow) in self.cells.all.iter().zip(&self.flow) {
+            discharge[cell.boundary] += flow;
+        }
+        discharge
+    }
+
+    /// Middles of the places where a boundary lets water through, and the flow through each, m3/s per m.
+    pub fn outlets(&self, boundary: usize) -> Vec<(Vec2, f64)> {
+        let cells = self.cells.all.iter().zip(&self.flow);
+        cells.filter(|(cell, _)| cell.boundary == boundary).map(|(cell, flow)| (cell.middle, *flow)).collect()
+    }
+
+    /// Totals since the start.
+    pub fn balance(&self) -> &WaterBalance {
+        &self.balance
+    }
+
+    /// Work done.
+    pub fn counters(&self) -> SeepageCounters {
+        self.counters
+    }
+
+    /// Names and bytes of the arrays that exist.
+    pub fn arrays(&self) -> Vec<(&'static str, usize)> {
+        let mut arrays = vec![
+            ("conduction", self.conduction.bytes()),
+            ("pore_pressure", 3 * size_of_val(self.head.as_slice()) + size_of_val(self.moisture.as_slice())),
+        ];
+        if let Some(factors) = &self.preconditioner {
+            arrays.push(("factors", factors.bytes()));
+        }
+        arrays
+    }
+
+    /// Present time step, s.
+    pub fn time_step(&self) -> f64 {
+        self.dt
+    }
+
+    /// Water that node `i` has gained since a state, m3 per m.
+    fn gained(&self, i: usize, head: &[f64], moisture: &[Moisture]) -> f64 {
+        let pores = self.volume[i] * self.porosity[i];
+        let swelling = self.compressibility(i, &moisture[i]) * (self.head[i] - head[i]);
+        pores * (self.moisture[i].saturation - moisture[i].saturation) + swelling
+    }
+
+    /// Water that node `i` takes up by its compression per metre of head, m2 per m: `V n S_r gamma_f / K_f`.
+    fn compressibility(&self, i: usize, moisture: &Moisture) -> f64 {
+        self.volume[i] * self.porosity[i] * moisture.saturation * self.water.unit_weight
+            / self.water.bulk_modulus
+    }
+
+    fn moisture_at(&mut self, head: &[f64]) -> Vec<Moisture> {
+        self.retention
+            .iter()
+            .zip(head.iter().zip(&self.position))
+            .map(|(retention, (head, at))| match retention {
+                None => Moisture::SATURATED,
+                Some(curve) => {
+                    self.counters.retention_calls += 1;
+                    curve.at(head - at.y)
+                }
+            })
+            .collect()
+    }
+
+    /// Solves one backward Euler step to `end`, s. Returns whether it was solved.
+    ///
+    /// Conductivities are those at the start of the step. What is left is monotone in the heads, and two nested Newton
+    /// iterations find its solution from anywhere (Casulli and Zanolli 2010, SIAM J. Sci. Comput. 32): the retention
+    /// curve is the difference of two curves that steepen as they rise, of which the outer iteration follows one and the
+    /// inner the other. A step from which little changes follows the retention curve itself, and needs no nesting.
+    fn solve(&mut self, dt: f64, end: f64) -> bool {
+        let begun = Begun {
+            head: self.head.clone(),
+            relative: self.moisture.iter().map(|moisture| moisture.relative_conductivity).collect(),
+            moisture: self.moisture.clone(),
+            dt,
+            end,
+        };
+        let holds = self.holds.clone();
+        let mut switches = vec![0_u32; self.holds.len()];
+        let mut solved = self.newton(&begun, None, &mut switches, DIRECT_ITERATIONS);
+        if !solved {
+            self.holds = holds;
+            switches.fill(0);
+            // The first outer iterate is where only the inner curve bends.
+            for ((k, head), at) in self.head.iter_mut().enumerate().zip(&self.position) {
+                *head = begun.head[k]
+                    .min(self.retention[k].map_or(f64::INFINITY, |curve| at.y + curve.steepest()));
+            }
+            for _ in 0..MOST_ITERATIONS {
+                let outer = self.head.clone();
+                if !self.newton(&begun, Some(&outer), &mut switches, MOST_ITERATIONS) {
+                    return false;
+                }
+                let moved =
+                    self.head.iter().zip(&outer).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+                if moved < HEAD_TOLERANCE * self.spacing {
+                    solved = true;
+                    break;
+                }
+            }
+        }
+        if solved {
+            self.inflow(end, &begun.relative);
+            self.moisture = self.moisture_at(&self.head.clone());
+        }
+        solved
+    }
+
+    /// Newton's iteration for the heads at the end of a step, along the outer curve's tangent at `outer`, or along the
+    /// retention curve itself. Returns whether it settled.
+    fn newton(&mut self, begun: &Begun, outer: Option<&[f64]>, switches: &mut [u32], most: u32) -> bool {
+        let Begun { head: start, moisture: wet, relative, dt, end } = begun;
+        for _ in 0..most {
+            let switched = self.switch_cells(*end, relative, switches);
+            let mut inflow = self.inflow(*end, relative);
+            let along = self.flow_along(relative, &self.head);
+            let (mut storage, mut largest) = (vec![0.0; self.head.len()], 0.0_f64);
+            for (i, storage) in storage.iter_mut().enumerate() {
+                let pores = self.volume[i] * self.porosity[i];
+                let own = self.head[i];
+                let (content, slope) = self.content(i, own, outer.map_or(own, |outer| outer[i]));
+                let squeezed = self.compressibility(i, &wet[i]);
+                let gained = pores * (content - wet[i].saturation) + squeezed * (own - start[i]);
+                let row = inflow.rows[i].iter();
+                let into = along[i] + row.map(|&(j, a)| a * self.head[j as usize]).sum::<f64>();
+                inflow.constant[i] += into - gained / dt;
+                *storage = (pores * slope + squeezed) / dt;
+                largest = largest.max((inflow.constant[i] * dt / pores).abs());
+            }
+            if !largest.is_finite() {
+                return false;
+            }
+            self.counters.iterations += 1;
+            let left = &inflow.constant;
+            let Some(change) = self.solve_linear(inflow.rows, relative, &storage, left, STEP_TOLERANCE)
+            else {
+                return false;
+            };
+            for (head, change) in self.head.iter_mut().zip(&change) {
+                *head += change;
+            }
+            let moved = change.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
+            if moved < HEAD_TOLERANCE * self.spacing && !switched {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Degree of saturation of node `i` at a head by its inner curve, and by the tangent of its outer curve at `outer`;
+    /// and the slope, 1/m.
+    fn content(&mut self, i: usize, head: f64, outer: f64) -> (f64, f64) {
+        let Some(curve) = self.retention[i] else { return (1.0, 0.0) };
+        if head == outer {
+            self.counters.retention_calls += 1;
+            let Moisture { saturation, capacity, .. } = curve.at(head - self.position[i].y);
+            return (saturation, capacity);
+        }
+        self.counters.retention_calls += 2;
+        let steepest = curve.steepest();
+        let peak = curve.at(steepest);
+        // The inner curve goes on along its steepest tangent, where the true one bends back.
+        let inner = |head: f64| {
+            let pressure_head = head - self.position[i].y;
+            let moisture = curve.at(pressure_head.min(steepest));
+            let beyond = (pressure_head - steepest).max(0.0);
+            (moisture.saturation + peak.capacity * beyond, moisture.capacity)
+        };
+        let at_outer = curve.at(outer - self.position[i].y);
+        let (content, slope) = inner(head);
+        let (outer_content, outer_slope) = inner(outer);
+        let bend = outer_slope - at_outer.capacity;
+        (content - (outer_content - at_outer.saturation) - bend * (head - outer), slope - bend)
+    }
+
+    /// Inflow that follows the gradient at stress nodes, whose conductivities are those of their nodes, m2/s.
+    fn flow_along(&self, relative: &[f64], head: &[f64]) -> Vec<f64> {
+        let mut inflow = vec![0.0; head.len()];
+        self.conduction.flow_along(head, |s| relative[s / STRESS_NODES], &mut inflow);
+        inflow
+    }
+
+    /// Inflow of every node at the present heads' conductivities. Fills the cells' flow.
+    fn inflow(&mut self, time: f64, relative: &[f64]) -> Inflow {
+        let mut rows = self.conduction.pair_rows(|i, j| between(relative, i, j));
+        let mut constant = vec![0.0; self.head.len()];
+        self.flow.fill(0.0);
+        let demands = self.demands(time);
+        for (pair, cells) in self.conduction.beyond().iter().zip(&self.cells.of_pair) {
+            let (i, j) = (pair.node as usize, pair.owner as usize);
+            // Across an edge with a head the image shows as much above it as its node lies below.
+            let (mut sign, mut offset, mut held) = (1.0, 0.0, None);
+            for cell in cells.iter().flatten().map(|&cell| cell as usize).filter(|&cell| self.holds[cell]) {
+                sign = -sign;
+                offset = 2.0 * demands[cell].head - offset;
+                held = Some(cell);
+            }
+            let strength = match held {
+                Some(cell) if sign < 0.0 => {
+                    let inward = sign * self.head[j] + offset - self.head[i];
+                    let strength =
+                        pair.open * self.edge_conductivity(relative, inward, cell, demands[cell].head, i, j);
+                    self.flow[cell] += strength * inward;
+                    strength
+                }
+                // Two heads in a corner show a node on beyond both: what passes between the edges is left to them.
+                _ => pair.closed * between(relative, i, j),
+            };
+            if sign > 0.0 {
+                offset = 0.0;
+            }
+            rows[i].push((pair.owner, sign * strength));
+            rows[i].push((pair.node, -strength));
+            constant[i] += strength * offset;
+        }
+        for (k, cell) in self.cells.all.iter().enumerate() {
+            let i = cell.node as usize;
+            let inside = self.boundaries[cell.boundary].condition.is_inside();
+            match (self.holds[k], inside) {
+                (true, true) => {
+                    let open = self.drain_conductance(cell);
+                    let head = demands[k].head;
+                    rows[i].push((cell.node, -open));
+                    constant[i] += open * head;
+                    self.flow[k] = open * (head - self.head[i]);
+                }
+                (true, false) => {}
+                (false, _) => {
+                    let flow = demands[k].inflow * cell.length;
+                    constant[i] += flow;
+                    self.flow[k] = flow;
+                }
+            }
+        }
+        Inflow { rows, constant }
+    }
+
+    /// Relative conductivity across an edge with a head: of water at the edge where it flows in, of the soil where it
+    /// flows out.
+    fn edge_conductivity(
+        &self,
+        relative: &[f64],
+        inward: f64,
+        cell: usize,
+        head: f64,
+        i: usize,
+        j: usize,
+    ) -> f64 {
+        let of_soil = between(relative, i, j);
+        if inward <= 0.0 {
+            return of_soil;
+        }
+        let Cell { node, middle, .. } = self.cells.all[cell];
+        let curve = self.retention[node as usize];
+        curve.map_or(1.0, |curve| curve.at(head - middle.y).relative_conductivity).max(of_soil)
+    }
+
+    fn demands(&self, time: f64) -> Vec<Demand> {
+        let demand = |cell: &Cell| {
+            let condition = &self.boundaries[cell.boundary].condition;
+            condition.demand(condition.value(time), cell.middle.y, cell.slope, self.water.unit_weight)
+        };
+        self.cells.all.iter().map(demand).collect()
+    }
+
+    fn drain_conductance(&self, cell: &Cell) -> f64 {
+        cell.drain_conductance(self.conductivity[cell.node as usize], self.spacing)
+    }
+
+    fn begin_cells(&mut self) {
+        let mut switches = vec![0; self.holds.len()];
+        let relative: Vec<f64> = self.moisture.iter().map(|m| m.relative_conductivity).collect();
+        self.switch_cells(0.0, &relative, &mut switches);
+    }
+
+    /// Lets cells that take no more than so much water hold their head or let it go. Returns whether one did.
+    fn switch_cells(&mut self, time: f64, relative: &[f64], switches: &mut [u32]) -> bool {
+        let demands = self.demands(time);
+        // What each cell would take if it held its head.
+        let mut taken = vec![0.0; demands.len()];
+        let mut strength = vec![0.0; demands.len()];
+        for (pair, cells) in self.conduction.beyond().iter().zip(&self.cells.of_pair) {
+            let (i, j) = (pair.node as usize, pair.owner as usize);
+            for k in cells.iter().flatten().map(|&cell| cell as usize) {
+                let inward = 2.0 * demands[k].head - self.head[j] - self.head[i];
+                let open = pair.open * self.edge_conductivity(relative, inward, k, demands[k].head, i, j);
+                taken[k] += open * inward;
+                strength[k] += open;
+            }
+        }
+        let mut switched = false;
+        for (k, demand) in demands.iter().enumerate() {
+            let cell = &self.cells.all[k];
+            if self.boundaries[cell.boundary].condition.is_inside() {
+                strength[k] = self.drain_conductance(cell);
+                taken[k] = strength[k] * (demand.head - self.head[cell.node as usize]);
+            }
+            let margin = HYSTERESIS * self.spacing * strength[k];
+            let most = demand.inflow * cell.length + if self.holds[k] { margin } else { -margin };
+            // Where nothing passes the edge a head would shut out what falls on it.
+            let wanted = taken[k] < most && (strength[k] > 0.0 || demand.inflow.is_infinite());
+            if wanted != self.holds[k] && switches[k] < MOST_SWITCHES {
+                self.holds[k] = wanted;
+                switches[k] += 1;
+                switched = true;
+            }
+        }
+        switched
+    }
+
+    /// Solves `(storage - a) x = residual` by conjugate gradients; the preconditioner is an older matrix, factored.
+    fn solve_linear(
+        &mut self,
+        pairs: Rows,
+        relative: &[f64],
+        storage: &[f64],
+        residual: &[f64],
+        tolerance: f64,
+    ) -> Option<Vec<f64>> {
+        let mut rows = pairs;
+        for (i, row) in rows.iter_mut().enumerate() {
+            for entry in row.iter_mut() {
+                entry.1 = -entry.1;
+            }
+            row.push((id(i), storage[i]));
+        }
+        let pairs = collected(rows);
+        let mut older = self.preconditioner.take();
+        let apply = |direction: &[f64]| {
+            let image = if self.conduction.has_direction() {
+                self.flow_along(relative, direction)
+            } else {
+                vec![0.0; direction.len()]
+            };
+            let row = |(i, along): (usize, f64)| {
+                pairs.iter_row(i).map(|(j, a)| a * direction[j]).sum::<f64>() - along
+            };
+            image.into_iter().enumerate().map(row).collect()
+        };
+        if let Some(factors) = &mut older
+            && let Some(solution) = conjugate_gradients(&apply, factors, residual, tolerance, STALE_AFTER)
+        {
+            self.preconditioner = older;
+            return Some(solution);
+        }
+        // The pairs alone reach half as far, so their band is half as wide.
+        let mut factors = BandedLu::factor(&pairs)?;
+        let solution = conjugate_gradients(&apply, &mut factors, residual, tolerance, MOST_GRADIENTS);
+        self.preconditioner = Some(factors);
+        self.counters.factorings += 1;
+        solution
+    }
+}

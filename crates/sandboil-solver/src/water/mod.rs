@@ -1,0 +1,8 @@
+//! Pore water: conduction, hydraulic conditions, pore pressure, partly saturated soil, still water.
+
+pub mod conditions;
+pub mod conduction;
+pub mod moving_edges;
+pub mod partly_saturated;
+pub mod pore_pressure;
+pub mod still_water;

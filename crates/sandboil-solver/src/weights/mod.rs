@@ -1,0 +1,12 @@
+//! Weights of the operators: neighbour lists, images beyond edges, rows of gradients, and their tables.
+
+pub mod balance;
+pub mod free_surface;
+pub mod geometry;
+pub mod images;
+pub mod lattice;
+pub mod lists;
+pub mod points;
+pub mod printed;
+pub mod rows;
+pub mod stencils;
