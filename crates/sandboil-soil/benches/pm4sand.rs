@@ -1,8 +1,8 @@
 //! Updates of PM4Sand per second on one core, along the reference path sp1 (simple shear at constant volume to
 //! liquefaction) and in ground that has liquefied.
 //!
-//! The last table compares machines: each figure also as the number of yardsticks (one exponential, one power and
-//! one square root) that fit into an update, both timed within the same second.
+//! The last table is for comparison between machines: it also gives the time of an update in units of a yardstick (one
+//! exponential, one power and one square root). Both are timed within the same second.
 
 #[path = "../tests/point/mod.rs"]
 mod point;
@@ -13,9 +13,9 @@ use point::{CALIBRATIONS, StrainPath, advance, consolidated, parts, sand, shear}
 use sandboil_soil::pm4sand::{PM4Sand, State};
 use sandboil_soil::{Integrator, SoilModel, StrainIncrement};
 
-/// Largest strain component of a host step.
+/// Largest strain component of an increment.
 const HOST_INCREMENTS: [f64; 3] = [1e-6, 2.5e-6, 1e-5];
-/// A material, where it starts and the host's steps.
+/// A material, its initial state and the strain increments.
 struct Walk {
     name: &'static str,
     sand: PM4Sand,
@@ -34,7 +34,7 @@ impl Walk {
         Self { name: "sp1", start: path.start(&sand), steps: steps.collect(), sand }
     }
 
-    /// Shear to and fro by 0.1 % where the mean stress has fallen to about `2 p_min`.
+    /// Shear cycles of 0.1 % at a mean stress of about `2 p_min`.
     fn liquefied(increment: f64) -> Self {
         let sand = sand(CALIBRATIONS[1]);
         let mut start = consolidated(&sand);
@@ -72,7 +72,7 @@ fn integrators() -> [(&'static str, Integrator); 3] {
     [("modified Euler", Integrator::default()), ("Runge-Kutta", rk4), ("reference", Integrator::Reference)]
 }
 
-#[expect(clippy::print_stdout, reason = "a bench reports")]
+#[expect(clippy::print_stdout, reason = "the bench prints its results")]
 fn compare_with_yardstick() {
     println!("walk, integrator, increment, updates per second, yardsticks per update");
     for increment in HOST_INCREMENTS {

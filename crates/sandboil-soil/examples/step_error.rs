@@ -1,8 +1,9 @@
-//! Error against part size and tolerance, as CSV: `cargo run --release -p sandboil-soil --example step_error`.
+//! Integration error for several part sizes and tolerances, as CSV:
+//! `cargo run --release -p sandboil-soil --example step_error`.
 //!
-//! Stress at the end of a first loading against that of a very fine one, stress differences (rms, kPa) along the three
-//! reference strain paths, cycles to 3 % shear strain in the cyclic test of the middle calibration, and evaluations of
-//! the rate equations per unit of shear strain. Every host step is one part.
+//! Columns: difference of stress (kPa) after first loading from a very fine solution, stress differences (rms, kPa)
+//! along the three reference strain paths, cycles to 3 % shear strain in the cyclic test of the middle calibration, and
+//! evaluations of the rate equations per unit of shear strain. Every increment is one part.
 
 #[path = "../tests/point/mod.rs"]
 mod point;
@@ -14,9 +15,9 @@ const PARTS: [f64; 8] = [5e-7, 1e-6, 2.5e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4];
 const TOLERANCES: [f64; 4] = [1e-6, 1e-5, 1e-4, 1e-3];
 /// Cyclic stress ratio of the middle calibration.
 const CSR: f64 = 0.147;
-/// Shear strain of the first loading: a whole number of every part.
+/// Shear strain of the first loading, a multiple of every part.
 const FIRST_LOADING: f64 = 4e-4;
-/// Part of the loading that stands for the exact one.
+/// Part size of the very fine solution.
 const FINE_PART: f64 = 1.25e-7;
 
 /// Stress of the middle calibration at the end of a first loading.
@@ -30,7 +31,7 @@ fn first_loading(integrator: &Integrator, largest: f64) -> Stress {
     sand.stress(&state)
 }
 
-#[expect(clippy::print_stdout, reason = "the table is what this program is for")]
+#[expect(clippy::print_stdout, reason = "the program prints a table")]
 fn print_row(name: &str, tolerance: f64, part: f64, integrator: &Integrator, exact: Stress) {
     let end = first_loading(integrator, part);
     let first = (end.xx - exact.xx).hypot(end.yy - exact.yy).hypot(end.xy - exact.xy);
@@ -50,7 +51,7 @@ fn print_row(name: &str, tolerance: f64, part: f64, integrator: &Integrator, exa
     );
 }
 
-#[expect(clippy::print_stdout, reason = "the table is what this program is for")]
+#[expect(clippy::print_stdout, reason = "the program prints a table")]
 fn main() {
     println!(
         "integrator,tolerance,part,first_loading_kPa,sp1_rms_kPa,sp1_reversals,sp1_near_neutral,sp2_rms_kPa,\

@@ -1,8 +1,8 @@
 //! Drucker-Prager plasticity in plane strain: non-associated, with cohesion, a tension cut-off and softening
 //! (Drucker and Prager 1952; plane-strain constants as in Bui, Fukagawa, Sako and Ohno 2008).
 //!
-//! Yield surface `sqrt(J2) + a I1 = k`, flow along `(s/(2 sqrt(J2)) + b I)`. The return to the surface is closest
-//! along the flow and exact, so stress never lies outside and does not drift.
+//! Yield surface `sqrt(J2) + a I1 = k`, plastic flow along `(s/(2 sqrt(J2)) + b I)`. The return to the surface
+//! follows the flow direction in closed form, so stress never lies outside the surface and does not drift.
 
 use crate::{
     Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Strength, Stress, UpdateReport,
@@ -13,37 +13,37 @@ use crate::{
 /// How the cone is fitted to the friction angle in plane strain.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Matching {
-    /// `a = tan(phi)/sqrt(9 + 12 tan^2(phi))`, as in most of the literature: exact for associated flow, up to some
-    /// percent too weak for `psi < phi`.
+    /// `a = tan(phi)/sqrt(9 + 12 tan^2(phi))`, as in most of the literature. Exact for associated flow; some percent
+    /// too weak for `psi < phi`.
     #[default]
     Usual,
-    /// Mohr-Coulomb strength at failure in plane strain, for any dilation angle.
+    /// Gives the Mohr-Coulomb strength at failure in plane strain for any dilation angle.
     General,
 }
 
 /// Loss of strength with plastic shear strain.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Softening {
-    /// Strength that is left; no component above that of the peak.
+    /// Residual strength; each component is at most that of the peak strength.
     pub residual: Strength,
-    /// Plastic shear strain (engineering) over which the constants of the cone fall in proportion to it.
+    /// Plastic shear strain (engineering) over which the constants of the cone fall linearly to their residual values.
     pub strain: f64,
 }
 
-/// Parameters beside the elastic ones.
+/// Strength parameters; the elastic constants are separate.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Parameters {
-    /// Strength at first.
+    /// Strength before any plastic shear strain.
     pub peak: Strength,
-    /// Softening, if any.
+    /// Softening; `None`: perfectly plastic.
     pub softening: Option<Softening>,
-    /// Largest mean stress, kPa, tension positive, at most that of the apex `c cot(phi)`; `None`: the apex.
+    /// Largest mean stress, kPa, tension positive, at most that of the apex, `c cot(phi)`; `None`: the apex.
     pub tension_cutoff: Option<f64>,
     /// Fit of the cone.
     pub matching: Matching,
 }
 
-/// Constants of the cone and of its flow.
+/// Constants of the yield cone and of the plastic potential.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Cone {
     /// Slope `a` against the first invariant.
@@ -60,15 +60,16 @@ impl Cone {
         let (sin_psi, cos_psi) = strength.psi.to_radians().sin_cos();
         let dilation = sin_psi / (9.0 * cos_psi * cos_psi + 12.0 * sin_psi * sin_psi).sqrt();
         let width = match matching {
-            // Both slopes are tan/sqrt(9 + 12 tan^2), written so that 90 degrees is no special angle.
+            // Both slopes are tan/sqrt(9 + 12 tan^2), in a form that is also finite at 90 degrees.
             Matching::Usual => (9.0 * cos * cos + 12.0 * sin * sin).sqrt(),
-            // At failure nothing flows along z, so the deviator there is `-2 b sqrt(J2)`: put into the yield
-            // surface and compared with Mohr-Coulomb's circle.
+            // At failure the plastic strain along z is zero, so the deviator along z is `-2 b sqrt(J2)`. The slope
+            // follows from comparing the yield surface at that deviator with Mohr-Coulomb's circle.
             Matching::General => 3.0 * ((1.0 - 3.0 * dilation * dilation).sqrt() + dilation * sin),
         };
         Self { friction: sin / width, cohesion: 3.0 * strength.c * cos / width, dilation }
     }
 
+    /// Linear interpolation: `self` at `share = 0`, `other` at 1.
     fn between(&self, other: &Self, share: f64) -> Self {
         let mix = |a: f64, b: f64| a * (1.0 - share) + b * share;
         Self {
@@ -101,7 +102,7 @@ pub struct DruckerPrager {
     largest_invariant: f64,
 }
 
-/// What a point remembers.
+/// State of one point.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     stress: Stress,
@@ -111,8 +112,10 @@ pub struct State {
 impl DruckerPrager {
     /// Material with elastic constants and strength.
     ///
-    /// Softening is refused where the cohesion of the cone falls faster than elastic unloading, `G`, could follow:
-    /// a point then has no path to its residual strength.
+    /// # Errors
+    /// [`SoilError::InvalidParameter`] for a parameter outside its range. Softening is also refused where the
+    /// cohesion of the cone falls faster with plastic shear strain than the shear modulus `G`: stress then has no
+    /// path to the residual strength.
     pub fn new(elastic: Elastic, parameters: Parameters) -> Result<Self, SoilError> {
         let Parameters { peak, softening, tension_cutoff, matching } = parameters;
         let strength = peak.checked(["c", "phi", "psi"])?;
@@ -121,38 +124,40 @@ impl DruckerPrager {
         let (mut residual, mut softening_strain) = (peak, f64::INFINITY);
         if let Some(softening) = softening {
             let names = ["c_residual", "phi_residual", "psi_residual"];
-            let left = softening.residual.checked(names)?;
-            check(names[0], left.c, "at most c", left.c <= strength.c)?;
-            check(names[1], left.phi, "at most phi", left.phi <= strength.phi)?;
-            check(names[2], left.psi, "at most psi", left.psi <= strength.psi)?;
-            residual = Cone::new(&left, matching);
+            let lowest = softening.residual.checked(names)?;
+            check(names[0], lowest.c, "at most c", lowest.c <= strength.c)?;
+            check(names[1], lowest.phi, "at most phi", lowest.phi <= strength.phi)?;
+            check(names[2], lowest.psi, "at most psi", lowest.psi <= strength.psi)?;
+            residual = Cone::new(&lowest, matching);
             softening_strain = positive("softening_strain", softening.strain)?;
-            let steepest = elastic.constants().shear * softening_strain;
+            let largest_loss = elastic.constants().shear * softening_strain;
             check(
                 "softening_strain",
                 softening_strain,
-                "larger than the loss of cohesion over G: no elastic unloading follows steeper softening",
-                steepest > peak.cohesion - residual.cohesion,
+                "larger than the loss of cohesion divided by G, so that stress can follow the softening",
+                largest_loss > peak.cohesion - residual.cohesion,
             )?;
         }
         Ok(Self { elastic, peak, residual, softening_strain, largest_invariant })
     }
 
-    /// Largest first invariant before softening, kPa: that of the apex or of the cut-off.
+    /// Largest first invariant before softening, kPa: the smaller of apex and cut-off.
     fn peak_invariant(&self) -> f64 {
         self.largest_invariant.min(self.peak.apex())
     }
 
+    /// The cone after a plastic shear strain.
     fn cone(&self, plastic_shear: f64) -> Cone {
         self.peak.between(&self.residual, (plastic_shear / self.softening_strain).min(1.0))
     }
 
-    /// Plastic shear strain that takes a trial stress to the cone while its first invariant falls by `fall` per unit
-    /// of it: the first root of `f = 0` with the strength at the end of the step; zero inside.
+    /// Increment of plastic shear strain that returns a trial stress to the cone, where the first invariant falls by
+    /// `fall` per unit of plastic shear strain. It is the first root of `f = 0` with the strength at the end of the
+    /// step; zero for a trial stress inside the cone.
     ///
-    /// The constants are linear in plastic shear strain, so the equation is quadratic until softening ends and
-    /// linear after. Where it has no root before (softening steeper than unloading, at high pressure) the one after
-    /// it is left: the strength drops at once.
+    /// The constants of the cone are linear in plastic shear strain, so the equation is quadratic during softening and
+    /// linear after it. At high pressure, friction may fall faster than the stress unloads. The quadratic equation
+    /// then has no root, and the strength drops to the residual one in this step.
     fn plastic_shear(&self, size: f64, first_invariant: f64, before: f64, fall: f64) -> f64 {
         let now = self.cone(before);
         let excess = size - now.size_at(first_invariant);
@@ -160,22 +165,22 @@ impl DruckerPrager {
             return 0.0;
         }
         let shear = self.elastic.constants().shear;
-        let left = self.softening_strain - before;
-        if left > 0.0 {
+        let softening_left = self.softening_strain - before;
+        if softening_left > 0.0 {
             let friction_rate = (self.residual.friction - self.peak.friction) / self.softening_strain;
             let cohesion_rate = (self.residual.cohesion - self.peak.cohesion) / self.softening_strain;
             let slope = shear + now.friction * fall + cohesion_rate - friction_rate * first_invariant;
             let discriminant = slope * slope + 4.0 * friction_rate * fall * excess;
             let divisor = slope + discriminant.max(0.0).sqrt();
-            if discriminant >= 0.0 && divisor > 0.0 && 2.0 * excess <= left * divisor {
+            if discriminant >= 0.0 && divisor > 0.0 && 2.0 * excess <= softening_left * divisor {
                 return 2.0 * excess / divisor;
             }
         }
         (size - self.residual.size_at(first_invariant)) / (shear + self.residual.friction * fall)
     }
 
-    /// State after the return of a trial stress whose first invariant falls by `fall` per unit of plastic shear
-    /// strain.
+    /// State after the return of a trial stress to the surface. The first invariant falls by `fall` per unit of
+    /// plastic shear strain.
     fn returned(&self, trial: Stress, before: f64, fall: f64, report: &mut UpdateReport) -> State {
         let (size, first_invariant) = (trial.root_j2(), trial.first_invariant());
         let plastic = self.plastic_shear(size, first_invariant, before, fall);
@@ -191,7 +196,7 @@ impl DruckerPrager {
         if on_cone <= self.largest_invariant && admissible >= 0.0 {
             return state(plastic, on_cone, admissible);
         }
-        // Corner of cone and cut-off: the cut-off takes what is left of the mean stress, the cone the shear alone.
+        // Corner of cone and cut-off: the cut-off sets the mean stress, the cone reduces only the shear stress.
         if on_cone > self.largest_invariant {
             let plastic = self.plastic_shear(size, self.largest_invariant, before, 0.0);
             let admissible = self.cone(before + plastic).size_at(self.largest_invariant);
@@ -206,8 +211,8 @@ impl DruckerPrager {
     }
 }
 
-/// A stress with another first invariant and with `sqrt(J2)` no larger than what is admissible, kPa. The size comes
-/// from the surface and not from a difference, so round-off leaves nothing outside.
+/// The stress with the given first invariant, and with `sqrt(J2)` reduced to `admissible`, kPa, where it is larger.
+/// The size is taken from the surface, not from a difference, so round-off cannot leave the stress outside.
 fn reduced(stress: &Stress, first_invariant: f64, admissible: f64) -> Stress {
     let size = stress.root_j2();
     stress.with(first_invariant, if size > admissible { admissible / size } else { 1.0 })
@@ -216,7 +221,8 @@ fn reduced(stress: &Stress, first_invariant: f64, admissible: f64) -> Stress {
 impl SoilModel for DruckerPrager {
     type State = State;
 
-    /// A stress outside keeps its mean, or the largest one admitted, and loses the shear that is too much.
+    /// A stress outside the surface keeps its mean stress, limited to the largest admissible one; its deviator is
+    /// reduced to the surface.
     fn initialise(&self, stress: Stress, _void_ratio: Option<f64>) -> Result<State, SoilError> {
         let stress = if self.carries(&stress) {
             stress
@@ -301,8 +307,8 @@ mod tests {
         }
     }
 
-    /// On the cone, in the corner and at the apex, before, through and after softening, also where it is brittle:
-    /// `q` falls by `G` and I1 by at least `9 K b` for each unit of plastic shear strain.
+    /// On the cone, in the corner and at the apex; before, during and after softening, also where it is brittle:
+    /// `sqrt(J2)` falls by `G` and `I1` by at least `9 K b` per unit of plastic shear strain.
     #[test]
     fn plastic_shear_balances_the_stress() {
         let (shear, bulk) = (9.1e4, 2.7e5);
@@ -348,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn the_apex_is_that_of_mohr_and_coulomb() {
+    fn the_apex_is_that_of_mohr_coulomb() {
         for matching in [Matching::Usual, Matching::General] {
             let apex = cone(7.0, 37.0, 5.0, matching).apex() / 3.0;
             assert!((apex - 7.0 / 37.0_f64.to_radians().tan()).abs() < 1e-12);

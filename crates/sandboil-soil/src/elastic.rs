@@ -28,17 +28,18 @@ impl Elastic {
         self.moduli
     }
 
-    /// Stress, kPa, after a strain increment: the old stress turned with the material, plus `C de`.
+    /// Stress, kPa, after a strain increment: the old stress rotated with the material, plus `C de`.
     ///
-    /// The rotation is the Cayley form of Hughes and Winget (1980): a rotation for any spin, so invariants are
-    /// kept to round-off, and the Jaumann rate in the limit.
+    /// The rotation is that of Hughes and Winget (1980), in Cayley form. It is a pure rotation for any spin, so stress
+    /// invariants are kept to round-off. For small increments it gives the Jaumann rate.
     #[inline]
     pub fn moved(&self, stress: &Stress, de: &StrainIncrement) -> Stress {
         let Moduli { bulk, shear } = self.moduli;
         let volume = de.xx + de.yy;
         let mean = stress.plane_mean() + self.moduli.mean_stress_stiffness() * volume;
         let strain = Deviator { half_difference: 0.5 * (de.xx - de.yy), xy: 0.5 * de.xy };
-        // A clockwise turn of the material by `spin` is a view from axes turned counter-clockwise by it.
+        // Clockwise rotation of the material by `spin` gives the same components as counter-clockwise rotation of
+        // the axes by `spin`.
         let deviator = stress.plane_deviator().in_axes_turned(cayley(de.spin)) + strain * (2.0 * shear);
         Stress::of_plane(mean, deviator, stress.zz + (bulk - 2.0 / 3.0 * shear) * volume)
     }
@@ -75,7 +76,7 @@ impl SoilModel for Elastic {
     }
 }
 
-/// Cosine and sine of twice the angle `2 atan(spin/2)`, which is `spin` to second order.
+/// Cosine and sine of twice the angle `2 atan(spin/2)`; this angle equals `spin` to second order.
 #[inline]
 fn cayley(spin: f64) -> (f64, f64) {
     let scale = 1.0 / (1.0 + 0.25 * spin * spin);
@@ -93,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn one_dimensional_compression_is_stiff_by_k_plus_four_thirds_g() {
+    fn one_dimensional_compression_has_the_stiffness_k_plus_four_thirds_g() {
         let stress =
             rock().moved(&Stress::default(), &StrainIncrement { yy: -1e-4, ..StrainIncrement::default() });
         assert!((stress.yy + (3.0e5 + 4.0 / 3.0 * 1.0e5) * 1e-4).abs() < 1e-9);

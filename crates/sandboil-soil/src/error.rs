@@ -1,39 +1,39 @@
-/// What a constitutive model refuses or cannot do.
+/// Error of a constitutive model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SoilError {
-    /// A parameter outside its range; refused before any work.
+    /// A parameter outside its range.
     #[error("{name} = {value}: must be {expected}")]
     InvalidParameter {
         /// Name of the parameter.
         name: &'static str,
         /// The value given.
         value: f64,
-        /// What is allowed.
+        /// Allowed values, in words.
         expected: &'static str,
     },
     /// An input or a result that is not a finite number. The state is left unchanged.
     #[error("{quantity} is {value}, not a finite number")]
     NonFinite {
-        /// The offending quantity.
+        /// Name of the quantity.
         quantity: &'static str,
         /// Its value.
         value: f64,
     },
-    /// A strain increment so large that no path through it means anything. The state is left unchanged.
+    /// A strain increment larger than the limit for one increment. The state is left unchanged.
     #[error("strain increment {value}: one increment may change a component by at most {limit}")]
     StrainIncrementTooLarge {
         /// Largest component, absolute.
         value: f64,
-        /// Largest one accepted.
+        /// Largest component accepted.
         limit: f64,
     },
-    /// What a model that is not ours says of its failure.
+    /// Message of a model from outside this library.
     #[error("{0}")]
     Outside(String),
 }
 
-/// Refuses a number that is infinite or not a number.
+/// Refuses an infinite value and NaN.
 pub(crate) fn finite(quantity: &'static str, value: f64) -> Result<f64, SoilError> {
     if value.is_finite() { Ok(value) } else { Err(SoilError::NonFinite { quantity, value }) }
 }

@@ -1,7 +1,7 @@
-/// How the rate equations are integrated over a strain increment.
+/// Integration method of the rate equations over a strain increment.
 ///
-/// An increment is first cut into equal parts; every part is a committed increment of its own (reversal check,
-/// integration, cumulative fabric), so results hardly depend on the host's step.
+/// An increment is first divided into equal parts. Each part is integrated and committed separately (reversal check,
+/// integration, cumulative fabric), so results hardly depend on the size of the caller's increments.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Integrator {
     /// Two-stage modified Euler with error control (Sloan, Abbo and Sheng 2001).
@@ -11,21 +11,21 @@ pub enum Integrator {
         /// Largest strain component of a committed part.
         max_increment: f64,
     },
-    /// Classical four-stage Runge-Kutta, sub-steps bound by the stability limit `0.5 m p / G`.
+    /// Classical four-stage Runge-Kutta; the stability limit `0.5 m p / G` bounds the sub-steps.
     RungeKutta4 {
         /// Largest strain component of a committed part.
         max_increment: f64,
     },
-    /// The implementation of Chen and Arduino (2021), for comparison: modified Euler at parts of at most 2.5e-6,
-    /// moduli of the last commit, iterative drift correction, plastic modulus not clamped in dilation.
+    /// The implementation of Chen and Arduino (2021), for comparison: modified Euler with parts of at most 2.5e-6,
+    /// moduli of the last commit, iterative drift correction, plastic modulus not clamped during dilation.
     Reference,
 }
 
 impl Integrator {
     /// Largest strain component of a committed part with [`Integrator::Reference`].
     pub const REFERENCE_INCREMENT: f64 = 2.5e-6;
-    /// Default largest strain component of a committed part. Reversals are looked for once per part: above 5e-6 a
-    /// path whose direction turns nearly tangentially finds ones that are not there (`docs/theory/pm4sand.md`).
+    /// Default largest strain component of a committed part. Load reversals are detected once per part. With parts
+    /// above 5e-6, a path that turns nearly tangentially shows false reversals (`docs/theory/pm4sand.md`).
     pub const DEFAULT_INCREMENT: f64 = 5e-6;
     /// Default relative error per sub-step.
     pub const DEFAULT_TOLERANCE: f64 = 1e-5;

@@ -1,7 +1,7 @@
 //! Constitutive models as pure functions: (parameters, state, strain increment, rotation) -> (state, report).
 //!
-//! This crate knows no particle, no time and no file. Units: kPa for stress, strains are plain numbers.
-//! At this border stress and strain are tension positive; stress is effective.
+//! This crate contains no particles, no time and no files. Stress is effective, in kPa; strain is a plain number.
+//! Stress and strain are tension positive in every public function, except where noted.
 
 pub mod drucker_prager;
 pub mod elastic;

@@ -1,7 +1,7 @@
-//! The one interface of all soil models, and the list of those there are.
+//! The interface of all soil models, and the list of the models.
 //!
-//! A new model is one file: its parameters, its state, and [`SoilModel`] for them (`docs/theory/writing_a_model.md`).
-//! It joins the others by one line in [`Soil`] and one in [`with_model!`](crate::with_model).
+//! A new model is one file with its parameters, its state and its implementation of [`SoilModel`]
+//! (`docs/theory/writing_a_model.md`), and one line each in [`Soil`] and in [`with_model!`](crate::with_model).
 
 use crate::{
     Integrator, Moduli, SoilError, StrainIncrement, Stress, UpdateReport, drucker_prager::DruckerPrager,
@@ -11,30 +11,32 @@ use crate::{
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::fmt::Debug;
 
-/// A constitutive model: checked parameters, and pure functions from state and strain to state.
+/// A constitutive model: checked parameters, and pure functions that map a state and a strain increment to a new state.
 ///
-/// Stress is effective, kPa, tension positive, in space axes; strain is tension positive with engineering shear.
-/// A model turns its state with the material: `StrainIncrement::spin` is part of every increment.
+/// Stress is effective, kPa, tension positive, in fixed axes; strain is tension positive with engineering shear.
+/// A model rotates its state with the material: every increment contains a rotation, `StrainIncrement::spin`.
 pub trait SoilModel: Clone + Debug + Send + Sync {
-    /// All that one point remembers, its stress included. It can be stored, so that a run can be gone on with.
+    /// The whole state of one point, including its stress. It can be stored, so that a run can be continued.
     type State: Copy + Debug + Send + Sync + Serialize + DeserializeOwned;
 
     /// State at rest under an effective stress (kPa, tension positive), at zero strain. `void_ratio` is that of the
-    /// point; `None` takes the model's own, and a model whose answer does not depend on density ignores it.
+    /// point; `None` means the model's default. A model that does not depend on density ignores it.
     ///
-    /// A stress that the model cannot carry is replaced by the nearest one it can; [`SoilModel::stress`] tells it.
+    /// A stress outside the strength surface is replaced by an admissible one near it, which [`SoilModel::stress`]
+    /// returns.
     ///
     /// # Errors
-    /// [`SoilError::NonFinite`] or [`SoilError::InvalidParameter`] for input that means nothing.
+    /// [`SoilError::NonFinite`] for a stress that is not finite, [`SoilError::InvalidParameter`] for a void ratio
+    /// outside its range.
     fn initialise(&self, stress: Stress, void_ratio: Option<f64>) -> Result<Self::State, SoilError>;
 
-    /// Moves a state through a strain increment. On error the state is unchanged.
+    /// Updates a state by a strain increment. On error the state is unchanged.
     ///
-    /// `integrator` chooses how rate equations are integrated; a model solved in closed form ignores it.
+    /// `integrator` is the integration method of rate equations; a model in closed form ignores it.
     ///
     /// # Errors
     /// [`SoilError::NonFinite`] for an increment or a result that is not finite,
-    /// [`SoilError::StrainIncrementTooLarge`] for one beyond all meaning.
+    /// [`SoilError::StrainIncrementTooLarge`] for an increment above its limit.
     fn update(
         &self,
         state: &mut Self::State,
@@ -42,38 +44,38 @@ pub trait SoilModel: Clone + Debug + Send + Sync {
         integrator: &Integrator,
     ) -> Result<UpdateReport, SoilError>;
 
-    /// Effective stress in space axes, kPa, tension positive.
+    /// Effective stress in fixed axes, kPa, tension positive.
     fn stress(&self, state: &Self::State) -> Stress;
 
-    /// Present elastic moduli, kPa: they set wave speeds and the time step.
+    /// Present elastic moduli, kPa. The solver computes wave speeds and the time step from them.
     fn moduli(&self, state: &Self::State) -> Moduli;
 
     /// Shear modulus of the elastic static stage, kPa.
     fn static_shear_modulus(&self) -> f64;
 
-    /// Void ratio, for models that know it.
+    /// Void ratio; `None` for a model without it.
     fn void_ratio(&self, _state: &Self::State) -> Option<f64> {
         None
     }
 
-    /// Accumulated plastic shear strain (engineering), for models that soften with it.
+    /// Accumulated plastic shear strain (engineering); `None` for a model that does not soften with it.
     fn plastic_shear_strain(&self, _state: &Self::State) -> Option<f64> {
         None
     }
 
-    /// Whether the model can carry a stress as it is, so that [`SoilModel::initialise`] replaces nothing.
+    /// Whether a stress is admissible, so that [`SoilModel::initialise`] keeps it.
     fn carries(&self, _stress: &Stress) -> bool {
         true
     }
 
-    /// The model for reconsolidation after shaking, and the state made ready for it; `None` where that makes no
-    /// difference.
+    /// The model for reconsolidation after shaking; `state` is prepared for it. `None` for a model that is the same
+    /// in reconsolidation.
     fn reconsolidating(&self, _state: &mut Self::State) -> Option<Self> {
         None
     }
 }
 
-/// A soil model as one region uses it.
+/// The soil model of one region.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Soil {
     /// Linear elasticity.
@@ -84,13 +86,13 @@ pub enum Soil {
     MohrCoulomb(MohrCoulomb),
     /// PM4Sand.
     PM4Sand(Box<PM4Sand>),
-    /// Elasticity stiffened by the pressure at rest.
+    /// Elasticity with stiffness from the pressure at rest.
     PressureElastic(PressureElastic),
     /// Undrained strength on total stress.
     TotalStress(TotalStress),
 }
 
-/// Runs generic code on whichever model a [`Soil`] holds: `with_model!(soil, model => model.moduli(..))`.
+/// Runs generic code on the model that a [`Soil`] holds: `with_model!(soil, model => model.moduli(..))`.
 #[macro_export]
 macro_rules! with_model {
     ($soil:expr, $model:ident => $body:expr) => {
@@ -105,7 +107,7 @@ macro_rules! with_model {
     };
 }
 
-/// A boxed model is a model: large parameter sets stay out of line in [`Soil`].
+/// A boxed model is also a model, so [`Soil`] can hold large parameter sets in a box.
 impl<M: SoilModel> SoilModel for Box<M> {
     type State = M::State;
 
@@ -157,7 +159,7 @@ impl Soil {
         with_model!(self, model => model.static_shear_modulus())
     }
 
-    /// Elastic moduli of unsheared ground under an effective stress (kPa, tension positive), kPa.
+    /// Small-strain elastic moduli, kPa, under an effective stress (kPa, tension positive).
     ///
     /// # Errors
     /// As [`SoilModel::initialise`].

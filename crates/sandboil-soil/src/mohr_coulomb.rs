@@ -1,8 +1,8 @@
 //! Mohr-Coulomb plasticity in plane strain: elastic, perfectly plastic, non-associated, with a tension cut-off.
 //!
-//! All three principal stresses count: two lie in the plane, the third is the out-of-plane stress, which may be the
-//! largest or the smallest. The return to the surface is exact, to a plane, an edge or the apex of the pyramid, in
-//! principal stresses (de Souza Neto, Peric and Owen 2008, chapter 8).
+//! All three principal stresses are considered: two lie in the plane; the third is the out-of-plane stress, which may
+//! be the largest, the intermediate or the smallest. The return to the surface is exact, in principal stresses, to a
+//! plane, an edge or the apex of the pyramid (de Souza Neto, Peric and Owen 2008, chapter 8).
 
 use crate::{
     Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Strength, Stress, UpdateReport,
@@ -17,16 +17,20 @@ pub struct MohrCoulomb {
     sin_psi: f64,
     /// `2 c cos(phi)`, kPa.
     cohesion: f64,
-    /// Largest principal stress, kPa: the apex without a cut-off, infinite without friction.
+    /// Largest admissible principal stress, kPa, tension positive. Without a cut-off it is that of the apex, which is
+    /// infinite without friction.
     tension: f64,
 }
 
-/// Principal stresses from the largest, tension positive, kPa.
+/// Principal stresses in descending order, tension positive, kPa.
 type Principal = [f64; 3];
 
 impl MohrCoulomb {
     /// Material with elastic constants, strength, and the largest principal tension, kPa (`None`: that of the apex,
     /// `c cot(phi)`).
+    ///
+    /// # Errors
+    /// [`SoilError::InvalidParameter`] for a parameter outside its range.
     pub fn new(elastic: Elastic, strength: Strength, tension_cutoff: Option<f64>) -> Result<Self, SoilError> {
         let strength = strength.checked(["c", "phi", "psi"])?;
         let (sin_phi, cos_phi) = strength.phi.to_radians().sin_cos();
@@ -35,12 +39,12 @@ impl MohrCoulomb {
         Ok(Self { elastic, sin_phi, sin_psi, cohesion: 2.0 * strength.c * cos_phi, tension })
     }
 
-    /// `(s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi)`, kPa.
+    /// Yield function `(s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi)`, kPa.
     fn excess(&self, largest: f64, smallest: f64) -> f64 {
         (largest - smallest) + (largest + smallest) * self.sin_phi - self.cohesion
     }
 
-    /// Largest principal stress that the surface admits with the smallest one, kPa.
+    /// Largest principal stress on the yield surface for a smallest principal stress, kPa.
     fn largest_with(&self, smallest: f64) -> f64 {
         (smallest * (1.0 - self.sin_phi) + self.cohesion) / (1.0 + self.sin_phi)
     }
@@ -50,7 +54,7 @@ impl MohrCoulomb {
         self.cohesion / (2.0 * self.sin_phi)
     }
 
-    /// Principal stresses after the return of ordered trial ones, with the flow of a dilation angle.
+    /// Principal stresses after the return of the trial ones to the surface, with plastic flow at a dilation angle.
     fn admissible(&self, trial: Principal, sin_psi: f64, report: &mut UpdateReport) -> Principal {
         let [s1, s2, s3] = trial;
         let excess = self.excess(s1, s3);
@@ -58,12 +62,13 @@ impl MohrCoulomb {
             return trial;
         }
         let Moduli { bulk, shear } = self.elastic.constants();
-        // Falls of the stresses per unit of flow on the plane of the largest and the smallest one: `along` on all
-        // three, and what shear adds to the outer two.
+        // Decrease of the principal stresses per unit of plastic flow on the plane of the largest and the smallest
+        // one: `along` acts on all three; `on_largest` and `on_smallest` are added to those two.
         let along = 2.0 * (bulk - 2.0 / 3.0 * shear) * sin_psi;
         let (on_largest, on_smallest) = (2.0 * shear * (1.0 + sin_psi), -2.0 * shear * (1.0 - sin_psi));
-        // Fall of a plane's excess by its own flow, by that of the plane with which it shares the largest stress,
-        // and by that of the plane with which it shares the smallest.
+        // Decrease of the yield function of a plane by its own flow (`own`), by flow of the plane that has the same
+        // largest stress (`shares_largest`), and by flow of the plane that has the same smallest stress
+        // (`shares_smallest`).
         let (plus, minus) = (1.0 + self.sin_phi, 1.0 - self.sin_phi);
         let common = 2.0 * along * self.sin_phi;
         let shares_largest = common + on_largest * plus;
@@ -77,10 +82,10 @@ impl MohrCoulomb {
         if smallest <= middle && middle <= largest {
             return [largest, middle, smallest];
         }
-        // Flow of two planes at once: `own x + shared y = f_x`, `shared x + own y = f_y`.
+        // Flow `x` and `y` of two planes together: `own x + shared y = f_x`, `shared x + own y = f_y`.
         let both = |other: f64, shared: f64| (excess + other) / (own + shared);
         if (1.0 - sin_psi) * s1 - 2.0 * s2 + (1.0 + sin_psi) * s3 > 0.0 {
-            // The edge where the middle stress is the smallest.
+            // The edge where the intermediate stress equals the smallest.
             let sum = both(self.excess(s1, s2), shares_largest);
             let smallest = 0.5 * (s2 + s3) - sum * (along + 0.5 * on_smallest);
             let largest = self.largest_with(smallest);
@@ -88,7 +93,7 @@ impl MohrCoulomb {
                 return [largest, smallest, smallest];
             }
         } else {
-            // The edge where it is the largest.
+            // The edge where the intermediate stress equals the largest.
             let sum = both(self.excess(s2, s3), shares_smallest);
             let smallest = s3 - sum * (along + on_smallest);
             let largest = self.largest_with(smallest);
@@ -100,12 +105,12 @@ impl MohrCoulomb {
         [self.apex(); 3]
     }
 
-    /// Stress after the return of a trial one. Tension above the cut-off is then cut from each principal stress by
-    /// itself.
+    /// Stress after the return of a trial stress to the surface. Each principal stress is then limited to the tension
+    /// cut-off separately.
     fn returned(&self, trial: &Stress, sin_psi: f64, report: &mut UpdateReport) -> Stress {
         let (mean, radius, zz) = (trial.plane_mean(), trial.radius(), trial.zz);
         let (upper, lower) = (mean + radius, mean - radius);
-        // Where the out-of-plane stress stands among the three.
+        // Position of the out-of-plane stress in the descending order.
         let place = if zz > upper {
             0
         } else if zz >= lower {
@@ -120,9 +125,9 @@ impl MohrCoulomb {
         };
         let on_surface = self.admissible(ordered, sin_psi, report);
         let admitted = on_surface.map(|stress| stress.min(self.tension));
-        // Without a cut-off, `tension` is the apex, and takes round-off alone.
+        // Without a cut-off, `tension` is the apex and removes only round-off.
         if self.tension < self.apex() && admitted != on_surface {
-            // Not also the apex, from where it was cut.
+            // Count the cut-off only, not also a return to the apex before it.
             *report = UpdateReport { tension_cutoffs: 1, ..UpdateReport::default() };
         }
         if admitted == ordered {
@@ -141,7 +146,8 @@ impl MohrCoulomb {
 impl SoilModel for MohrCoulomb {
     type State = Stress;
 
-    /// A stress outside keeps its mean, or the largest one admitted, and loses the shear that is too much.
+    /// A stress outside the surface is returned to it without dilatancy, so it keeps its mean stress except at the apex
+    /// and above the tension cut-off.
     fn initialise(&self, stress: Stress, _void_ratio: Option<f64>) -> Result<Stress, SoilError> {
         self.returned(&stress.finite("initial stress")?, 0.0, &mut UpdateReport::default())
             .finite("initial stress")

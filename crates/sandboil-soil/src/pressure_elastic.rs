@@ -1,7 +1,7 @@
-//! Elasticity whose stiffness follows the effective pressure at rest, `G = G_ref (p'/p_ref)^n` with K/G constant.
+//! Elasticity with stiffness from the effective pressure at rest, `G = G_ref (p'/p_ref)^n` with K/G constant.
 //!
-//! Each point takes its moduli from the stress it is initialised at and keeps them. Moduli that followed the pressure
-//! through a cycle of load would give or take energy in it (Zytynski, Randolph, Nova and Wroth 1978).
+//! The moduli of a point follow from its initial stress and stay constant. If they changed with pressure during a
+//! load cycle, the cycle would create or dissipate energy (Zytynski, Randolph, Nova and Wroth 1978).
 
 use crate::{
     Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport,
@@ -9,7 +9,7 @@ use crate::{
     error::{check, positive},
 };
 
-/// Elastic material stiffened by the pressure at rest.
+/// Elastic material with stiffness from the pressure at rest.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PressureElastic {
     reference: Moduli,
@@ -17,7 +17,7 @@ pub struct PressureElastic {
     reference_pressure: f64,
 }
 
-/// What a point remembers: its stress and the elasticity it was given.
+/// State of one point: its stress and its elastic constants.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     stress: Stress,
@@ -25,12 +25,15 @@ pub struct State {
 }
 
 impl PressureElastic {
-    /// Least pressure that counts, over the reference pressure: at the atmospheric one that of 5 cm of soil. Without
-    /// it the surface would have no stiffness.
+    /// Lower limit of the pressure, relative to the reference pressure, so that soil at the ground surface has some
+    /// stiffness. For an atmospheric reference pressure it is the pressure below 5 cm of soil.
     const PRESSURE_FLOOR: f64 = 0.01;
 
     /// Material with elastic constants at the mean effective stress `reference_pressure`, kPa, compression positive,
     /// and an exponent in [0, 1].
+    ///
+    /// # Errors
+    /// [`SoilError::InvalidParameter`] for an exponent or a pressure outside its range.
     pub fn new(reference: Elastic, exponent: f64, reference_pressure: f64) -> Result<Self, SoilError> {
         Ok(Self {
             reference: reference.constants(),
@@ -100,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn no_pressure_or_tension_leaves_a_tenth_of_the_stiffness() {
+    fn stiffness_at_no_pressure_and_in_tension_is_a_tenth() {
         for pressure in [0.0, 1e-9, 1.0, -50.0] {
             let soil = soil(0.5);
             let shear = soil.moduli(&soil.initialise(at_rest(pressure), None).unwrap()).shear;
@@ -109,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn moduli_stay_when_pressure_changes() {
+    fn moduli_stay_constant_when_pressure_changes() {
         let soil = soil(0.5);
         let mut state = soil.initialise(at_rest(100.0), None).unwrap();
         let before = soil.moduli(&state);

@@ -1,4 +1,4 @@
-/// What happened inside one or many updates: the guards that acted are counted, never silent.
+/// Counters of one or many updates: work done, and how often each numerical limit acted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct UpdateReport {
     /// Accepted sub-steps of plastic integration.
@@ -7,17 +7,17 @@ pub struct UpdateReport {
     pub evaluations: u64,
     /// Committed parts that ended at the pressure floor.
     pub pressure_floors: u64,
-    /// Committed parts whose stress was taken back to the bounding surface.
+    /// Committed parts whose stress was returned to the bounding surface.
     pub bounding_caps: u64,
-    /// Updates that ended at a cut-off of tension.
+    /// Updates that ended at the tension cut-off.
     pub tension_cutoffs: u64,
-    /// Updates that ended at the apex of a strength surface.
+    /// Updates that ended at the apex of the strength surface.
     pub apex_returns: u64,
-    /// Sub-steps accepted at the smallest size although their error was above the tolerance.
+    /// Sub-steps of the smallest size that were accepted with an error above the tolerance.
     pub forced_acceptances: u64,
     /// Load reversals.
     pub reversals: u64,
-    /// Reversals declared while loading nearly tangentially, where another sub-step size may decide otherwise.
+    /// Reversals detected during nearly tangential loading, which may depend on the sub-step size.
     pub near_neutral_reversals: u64,
 }
 
@@ -35,7 +35,7 @@ impl UpdateReport {
         self.near_neutral_reversals += other.near_neutral_reversals;
     }
 
-    /// Every count by its name.
+    /// Every counter with its name.
     pub fn named(&self) -> [(&'static str, u64); 9] {
         [
             ("substeps", self.substeps),

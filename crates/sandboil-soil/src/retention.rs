@@ -5,49 +5,51 @@ use crate::error::{SoilError, check, positive};
 
 /// Exponent `l` of the effective saturation in Mualem's conductivity.
 const TORTUOSITY: f64 = 0.5;
-/// Relative conductivity below which none falls: films of water and vapour, which Mualem's capillaries leave out, keep
-/// dry soil from becoming a perfect seal.
+/// Lower limit of the relative conductivity. Mualem's capillary model neglects water films and vapour, through which
+/// dry soil still conducts some water.
 const LEAST_RELATIVE_CONDUCTIVITY: f64 = 1e-6;
 
-/// Retention curve of a soil.
+/// Water retention curve of a soil.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct VanGenuchten {
-    /// `a`, 1/m: about the inverse of the capillary rise.
+    /// `alpha`, 1/m: about the inverse of the capillary rise.
     alpha: f64,
-    /// `n`: steepness.
+    /// `n`: steepness of the curve.
     n: f64,
+    /// Degree of saturation at great suction.
     residual: f64,
+    /// Degree of saturation without suction.
     saturated: f64,
 }
 
-/// What a soil holds and lets through at a pressure head.
+/// Saturation and conductivity of a soil at a pressure head.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Moisture {
     /// Degree of saturation `S_r`.
     pub saturation: f64,
-    /// `dS_r/dh_p`, 1/m.
+    /// Specific capacity `dS_r/dh_p`, 1/m.
     pub capacity: f64,
-    /// Conductivity over that of the saturated soil.
+    /// Conductivity relative to that of the saturated soil.
     pub relative_conductivity: f64,
 }
 
 impl Moisture {
-    /// Of a soil with all pores full.
+    /// Soil with all pores full of water.
     pub const SATURATED: Self = Self { saturation: 1.0, capacity: 0.0, relative_conductivity: 1.0 };
 }
 
 impl VanGenuchten {
-    /// A curve by `alpha` (1/m), `n`, and the degrees of saturation at great suction and without suction.
+    /// A curve with `alpha` (1/m), `n`, and the degrees of saturation at great suction (`residual`) and without
+    /// suction (`saturated`).
     ///
     /// # Errors
-    /// [`SoilError::InvalidParameter`] for `alpha` not positive, `n` not above 1, degrees of saturation that do not
-    /// rise within [0, 1].
+    /// [`SoilError::InvalidParameter`] unless `alpha > 0`, `n > 1` and `0 <= residual < saturated <= 1`.
     pub fn new(alpha: f64, n: f64, residual: f64, saturated: f64) -> Result<Self, SoilError> {
         positive("alpha", alpha)?;
         check("n", n, "above 1", n > 1.0)?;
         check("residual_saturation", residual, "in [0, 1)", (0.0..1.0).contains(&residual))?;
         let rises = saturated > residual && saturated <= 1.0;
-        check("saturated_saturation", saturated, "above the residual one, at most 1", rises)?;
+        check("saturated_saturation", saturated, "above residual_saturation and at most 1", rises)?;
         Ok(Self { alpha, n, residual, saturated })
     }
 
@@ -57,7 +59,8 @@ impl VanGenuchten {
         -m.powf(1.0 / self.n) / self.alpha
     }
 
-    /// The state at pressure head `h_p` (m): positive below the water table, negative suction above it.
+    /// Saturation and conductivity at a pressure head `h_p`, m: positive below the water table, negative (suction)
+    /// above it.
     pub fn at(&self, pressure_head: f64) -> Moisture {
         if pressure_head >= 0.0 {
             return Moisture { saturation: self.saturated, ..Moisture::SATURATED };
@@ -67,7 +70,7 @@ impl VanGenuchten {
         let x = (self.alpha * suction).powf(self.n);
         let effective = (1.0 + x).powf(-m);
         let span = self.saturated - self.residual;
-        // `1 - (1 - S_e^(1/m))^m` with S_e^(1/m) = 1/(1 + x), free of cancellation at great suction.
+        // `1 - (1 - S_e^(1/m))^m` with `S_e^(1/m) = 1/(1 + x)`, in a form without cancellation at great suction.
         let open = -(m * (-1.0 / (1.0 + x)).ln_1p()).exp_m1();
         let relative = effective.powf(TORTUOSITY) * open * open;
         Moisture {
@@ -84,16 +87,16 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn values_by_hand() {
+    fn agrees_with_values_computed_by_hand() {
         let state = VanGenuchten::new(2.0, 2.0, 0.0, 1.0).unwrap().at(-0.5);
-        // x = 1: S_e = 1/sqrt 2, dS_e/dh = a m n (a y)^(n-1) (1 + x)^(-m-1).
+        // x = 1: S_e = 1/sqrt(2), dS_e/dh = a m n (a y)^(n-1) (1 + x)^(-m-1), with a = alpha and suction y.
         assert!((state.saturation - 0.5_f64.sqrt()).abs() < 1e-15);
         assert!((state.capacity - 2.0 * 2.0_f64.powf(-1.5)).abs() < 1e-15);
         assert!((state.relative_conductivity - 0.072_138).abs() < 1e-6);
     }
 
     #[test]
-    fn refuses_what_is_no_curve() {
+    fn parameters_outside_their_range_are_refused() {
         for (alpha, n, residual, saturated) in [
             (0.0, 2.0, 0.1, 1.0),
             (-1.0, 2.0, 0.1, 1.0),
@@ -110,7 +113,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_curve_falls_with_suction_and_capacity_is_its_slope(
+        fn saturation_falls_with_suction_and_capacity_is_its_slope(
             alpha in 0.01..30.0_f64,
             n in 1.05..8.0_f64,
             residual in 0.0..0.5_f64,

@@ -1,4 +1,4 @@
-//! Strength of soil after Mohr and Coulomb, as several models take it.
+//! Mohr-Coulomb strength parameters, shared by several models.
 
 use crate::{SoilError, error::check};
 
@@ -9,14 +9,15 @@ pub struct Strength {
     pub c: f64,
     /// Friction angle phi, degrees.
     pub phi: f64,
-    /// Dilation angle psi, degrees; `psi = phi` is associated flow, `psi = 0` keeps volume.
+    /// Dilation angle psi, degrees: `psi = phi` is associated flow, `psi = 0` is flow at constant volume.
     pub psi: f64,
 }
 
 impl Strength {
-    /// The strength itself, refused unless `c >= 0`, `0 <= psi <= phi < 90` and something of c and phi is left.
+    /// Returns the strength, or an error unless `c >= 0`, `0 <= psi <= phi < 90` and one of `c` and `phi` is positive.
     ///
-    /// Contraction (`psi < 0`) is refused because a perfectly plastic soil would contract without end.
+    /// Contraction (`psi < 0`) is refused because a perfectly plastic soil would contract without limit. The argument
+    /// holds the parameter names for the error.
     pub(crate) fn checked(self, [c, phi, psi]: [&'static str; 3]) -> Result<Self, SoilError> {
         check(phi, self.phi, "in [0, 90) degrees", (0.0..90.0).contains(&self.phi))?;
         check(psi, self.psi, "in [0, phi] degrees", (0.0..=self.phi).contains(&self.psi))?;
@@ -24,14 +25,14 @@ impl Strength {
         check(
             c,
             self.c,
-            "positive where phi is 0: soil without strength is a fluid",
+            "positive if phi is 0, because the soil would have no strength",
             self.c + self.phi > 0.0,
         )?;
         Ok(self)
     }
 
-    /// Refuses a mean or principal tension, kPa, that is negative or above the apex `c cot(phi)`; infinity where
-    /// none is given.
+    /// Returns the given tension cut-off, kPa, or infinity for `None`. A cut-off that is negative or above the apex
+    /// `c cot(phi)` is an error.
     pub(crate) fn tension_cutoff(&self, given: Option<f64>) -> Result<f64, SoilError> {
         let Some(tension) = given else { return Ok(f64::INFINITY) };
         let (sin, cos) = self.phi.to_radians().sin_cos();

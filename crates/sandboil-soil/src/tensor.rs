@@ -1,4 +1,4 @@
-//! In-plane tensors. A symmetric plane tensor is its mean and its deviator; the deviator has two numbers.
+//! In-plane tensors. A symmetric plane tensor is stored as its mean and its deviator, which has two components.
 
 use crate::error::{SoilError, finite};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
@@ -41,21 +41,21 @@ impl Stress {
         self.xx + self.yy + self.zz
     }
 
-    /// Square root of the second deviatoric invariant J2, kPa: the shear stress, where there is nothing else.
+    /// Square root of the second deviatoric invariant J2, kPa. In pure shear it equals the shear stress.
     #[inline]
     pub fn root_j2(&self) -> f64 {
         let [a, b, c] = [self.xx - self.yy, self.yy - self.zz, self.zz - self.xx];
         ((a * a + b * b + c * c) / 6.0 + self.xy * self.xy).sqrt()
     }
 
-    /// Stress of an in-plane mean and deviator and an out-of-plane stress, kPa.
+    /// Stress from its in-plane mean, in-plane deviator and out-of-plane component, kPa.
     #[inline]
     pub(crate) fn of_plane(mean: f64, deviator: Deviator, zz: f64) -> Self {
         let Deviator { half_difference, xy } = deviator;
         Self { xx: mean + half_difference, yy: mean - half_difference, xy, zz }
     }
 
-    /// The stress with another first invariant, kPa, and its three-dimensional deviator times a factor.
+    /// The stress with the given first invariant, kPa, and with its three-dimensional deviator multiplied by a factor.
     #[inline]
     pub(crate) fn with(&self, first_invariant: f64, factor: f64) -> Self {
         let (old, new) = (self.first_invariant() / 3.0, first_invariant / 3.0);
@@ -63,7 +63,7 @@ impl Stress {
         Self { xx: moved(self.xx), yy: moved(self.yy), xy: self.xy * factor, zz: moved(self.zz) }
     }
 
-    /// The stress itself, refused if a component is not a finite number.
+    /// Returns the stress, or an error if a component is not a finite number.
     pub(crate) fn finite(self, quantity: &'static str) -> Result<Self, SoilError> {
         for component in [self.xx, self.yy, self.xy, self.zz] {
             finite(quantity, component)?;
@@ -85,7 +85,7 @@ pub struct StrainIncrement {
     pub spin: f64,
 }
 
-/// Largest strain component accepted in one increment: 1000 %, beyond which no path means anything.
+/// Largest strain component accepted in one increment, 1000 %. A larger one is always an input error.
 const MAX_STRAIN_INCREMENT: f64 = 10.0;
 
 impl StrainIncrement {
@@ -94,11 +94,11 @@ impl StrainIncrement {
         self.within(MAX_STRAIN_INCREMENT)
     }
 
-    /// Refuses an increment with a component that is not finite, or a strain or spin beyond the lesser of 1000 % and
-    /// a limit.
+    /// Refuses an increment with a component that is not finite, or with a strain or spin above the smaller of 1000 %
+    /// and `limit`.
     pub(crate) fn within(&self, limit: f64) -> Result<(), SoilError> {
         let limit = limit.min(MAX_STRAIN_INCREMENT);
-        // A maximum passes over NaN, a sum does not.
+        // `f64::max` ignores NaN; a sum does not.
         let sum = finite("strain increment", self.xx + self.yy + self.xy + self.spin)?;
         let largest = self.xx.abs().max(self.yy.abs()).max(self.xy.abs()).max(self.spin.abs());
         if !(largest <= limit) {
@@ -114,7 +114,7 @@ impl StrainIncrement {
 pub struct Deviator {
     /// `(xx - yy)/2`.
     pub half_difference: f64,
-    /// Shear component (a tensor component: half of an engineering shear strain).
+    /// Shear component of the tensor (for strain, half of the engineering shear strain).
     pub xy: f64,
 }
 
@@ -134,7 +134,7 @@ impl Deviator {
         self.contract(self).sqrt()
     }
 
-    /// The same tensor seen in axes turned counter-clockwise by the angle whose double has this cosine and sine.
+    /// Components of the tensor in axes rotated counter-clockwise, given cosine and sine of twice the angle.
     #[inline]
     pub(crate) fn in_axes_turned(self, (cos2, sin2): (f64, f64)) -> Self {
         Self {

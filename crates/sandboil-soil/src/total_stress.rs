@@ -1,7 +1,7 @@
-//! Total-stress plasticity in plane strain: an undrained shear strength that belongs to the soil and not to its
-//! pressure, with softening to a residual strength.
+//! Total-stress plasticity in plane strain: an undrained shear strength that does not depend on pressure, with
+//! softening to a residual strength.
 //!
-//! Flow keeps volume, so the mean stress is elastic and both returns to the surface are radial.
+//! Plastic flow is at constant volume, so the mean stress is elastic and the return to either surface is radial.
 
 use crate::{
     Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport,
@@ -9,24 +9,24 @@ use crate::{
     error::{check, positive},
 };
 
-/// What the strength bounds.
+/// The stress measure that is limited by the strength.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Criterion {
-    /// The radius of Mohr's circle in the plane. The out-of-plane stress stays elastic.
+    /// The radius of the in-plane Mohr's circle. The out-of-plane stress stays elastic.
     #[default]
     Tresca,
-    /// `sqrt(J2)`. The radius becomes the strength once the out-of-plane stress has flowed to the in-plane mean;
-    /// before, it is smaller.
+    /// `sqrt(J2)`. The radius of the in-plane Mohr's circle at failure is smaller than the strength until plastic flow
+    /// has brought the out-of-plane stress to the in-plane mean; then the two are equal.
     VonMises,
 }
 
-/// How strength falls from its peak to the residual one with plastic shear strain `kappa`.
+/// Decrease of strength from the peak `S_u` to the residual `S_r` with plastic shear strain `kappa`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Decay {
     /// `S_r + (S_u - S_r) exp(-kappa/kappa_s)`.
     #[default]
     Exponential,
-    /// In proportion to `kappa`, at the residual strength from `kappa_s` on.
+    /// Linear in `kappa`; the residual strength is reached at `kappa_s`.
     Linear,
 }
 
@@ -37,7 +37,7 @@ pub struct Softening {
     pub residual: f64,
     /// Scale `kappa_s` of plastic shear strain (engineering).
     pub strain: f64,
-    /// Shape of the loss.
+    /// Shape of the decrease.
     pub decay: Decay,
 }
 
@@ -50,7 +50,7 @@ pub struct TotalStress {
     softening: Softening,
 }
 
-/// What a point remembers.
+/// State of one point.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     stress: Stress,
@@ -58,13 +58,15 @@ pub struct State {
 }
 
 impl TotalStress {
-    /// Newton steps to the plastic shear strain of exponential softening: it doubles its digits, and needs more than
-    /// ten only where softening is just short of too steep.
+    /// Largest number of Newton iterations for the plastic shear strain under exponential softening. Convergence is
+    /// quadratic; more than ten iterations occur only where softening is close to its steepest allowed slope.
     const MOST_ITERATIONS: u32 = 60;
 
     /// Material with elastic constants and the shear strength `peak`, kPa.
     ///
-    /// Softening is refused where strength falls faster than elastic unloading, `G`, could follow.
+    /// # Errors
+    /// [`SoilError::InvalidParameter`] for a parameter outside its range. Softening is also refused where strength
+    /// falls faster with plastic shear strain than the shear modulus `G`.
     pub fn new(
         elastic: Elastic,
         criterion: Criterion,
@@ -82,7 +84,7 @@ impl TotalStress {
         check(
             "softening_strain",
             strain,
-            "larger than (Su - Sr)/G: no elastic unloading follows steeper softening",
+            "larger than (Su - Sr)/G, so that stress can follow the softening",
             elastic.constants().shear * strain > peak - residual,
         )?;
         Ok(Self { elastic, criterion, peak, softening })
@@ -98,8 +100,8 @@ impl TotalStress {
         }
     }
 
-    /// Plastic shear strain that takes a trial of this size, kPa, to the surface, with the strength at the end of
-    /// the step; zero inside.
+    /// Increment of plastic shear strain that returns a trial stress of this size, kPa, to the surface, with the
+    /// strength at the end of the step; zero for a trial stress inside.
     fn plastic_shear(&self, size: f64, before: f64) -> f64 {
         let excess = size - self.strength(before);
         if excess <= 0.0 {
@@ -112,8 +114,8 @@ impl TotalStress {
             let plastic = excess / (shear - (self.peak - residual) / strain);
             return if before + plastic <= strain { plastic } else { to_residual };
         }
-        // The unbalanced stress falls with plastic strain and is concave: from beyond its root Newton's method
-        // comes down to it without passing it, until round-off.
+        // The unbalanced stress decreases with plastic strain and is concave. Newton's method started above the root
+        // therefore decreases to the root without passing it; the loop ends at round-off.
         let mut plastic = to_residual;
         for _ in 0..Self::MOST_ITERATIONS {
             let strength = self.strength(before + plastic);
@@ -127,7 +129,7 @@ impl TotalStress {
         plastic
     }
 
-    /// Size of a stress, kPa, in the measure that the strength bounds.
+    /// The stress measure that is limited by the strength, kPa.
     fn size(&self, stress: &Stress) -> f64 {
         match self.criterion {
             Criterion::Tresca => stress.radius(),
@@ -155,7 +157,7 @@ impl TotalStress {
 impl SoilModel for TotalStress {
     type State = State;
 
-    /// A stress outside loses the shear that is too much.
+    /// The deviator of a stress outside the surface is reduced to the surface.
     fn initialise(&self, stress: Stress, _void_ratio: Option<f64>) -> Result<State, SoilError> {
         let state = self.returned(stress.finite("initial stress")?, 0.0);
         state.stress.finite("initial stress")?;
@@ -212,7 +214,7 @@ mod tests {
     #[test]
     fn plastic_shear_balances_the_stress() {
         for decay in [Decay::Exponential, Decay::Linear] {
-            // The second is a millionth above the steepest softening there is a path for.
+            // The second strain is a millionth above the smallest one allowed.
             for strain in [0.05, 2e-3 * (1.0 + 1e-6)] {
                 let clay = clay(decay, strain).unwrap();
                 for before in [0.0, 0.3 * strain, 0.999 * strain, 30.0 * strain] {
@@ -229,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn inside_nothing_is_plastic() {
+    fn no_plastic_strain_inside_the_surface() {
         let clay = clay(Decay::Exponential, 0.05).unwrap();
         assert_eq!(clay.plastic_shear(25.0, 0.0), 0.0);
         assert_eq!(clay.plastic_shear(24.0, 0.0), 0.0);

@@ -1,21 +1,21 @@
-//! Whatever finite numbers go in, a refusal or finite numbers come out: no NaN, no panic, and a refused update
-//! leaves its state as it was.
+//! For any finite input, a model either returns an error or finite results: no NaN and no panic. An update that fails
+//! leaves the state unchanged.
 
 use proptest::prelude::*;
 use sandboil_soil::elastic::Elastic;
 use sandboil_soil::pm4sand::{Options, PM4Sand, Parameters};
 use sandboil_soil::{Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress};
 
-/// Parts into which the largest increment is cut at most: enough to see commits, few enough to be quick.
+/// Largest number of parts of an increment: enough for several commits, few enough for a short test.
 const MOST_PARTS: f64 = 3.0;
 
-/// Any finite number, all exponents alike.
+/// Any finite number, with all exponents equally probable.
 fn any_number() -> impl Strategy<Value = f64> {
     use prop::num::f64::{NEGATIVE, NORMAL, POSITIVE, SUBNORMAL, ZERO};
     POSITIVE | NEGATIVE | NORMAL | SUBNORMAL | ZERO
 }
 
-/// Any finite number, or one of the size that soil has.
+/// Any finite number, or one near a usual value for soil.
 fn number(usual: f64) -> impl Strategy<Value = f64> {
     prop_oneof![any_number(), -usual..usual, (0.0..1.0).prop_map(move |share: f64| usual * share)]
 }
@@ -24,7 +24,7 @@ fn option(usual: f64) -> impl Strategy<Value = Option<f64>> {
     prop_oneof![8 => Just(None), 1 => number(usual).prop_map(|value| Some(value.abs()))]
 }
 
-/// Parameters of which most are usual, so that many sets are accepted.
+/// Parameter sets with mostly usual values, so that many are accepted.
 fn parameters() -> impl Strategy<Value = Parameters> {
     let required = (
         prop_oneof![0.0..1.0, number(1.0).prop_map(f64::abs)],
@@ -116,7 +116,7 @@ fn increment() -> impl Strategy<Value = StrainIncrement> {
     })
 }
 
-/// The three integrators, with parts no smaller than a share of the increment: time is not what is asked here.
+/// The three integrators, with parts no smaller than a share of the increment, to limit the time of the test.
 fn integrator_for(kind: usize, de: &StrainIncrement, tolerance: f64) -> Integrator {
     let largest = de.xx.abs().max(de.yy.abs()).max(de.xy.abs());
     let max_increment = Integrator::DEFAULT_INCREMENT.max(largest / MOST_PARTS);
@@ -132,7 +132,7 @@ fn all_finite(numbers: impl IntoIterator<Item = f64>) -> bool {
     numbers.into_iter().all(f64::is_finite)
 }
 
-/// Takes a model from a stress through increments, and checks all it tells after every one.
+/// Applies increments to a model from an initial stress and checks all outputs after each.
 fn drive<M: SoilModel>(
     model: &M,
     (stress, void_ratio): (Stress, Option<f64>),
@@ -165,9 +165,9 @@ fn path() -> impl Strategy<Value = Vec<(StrainIncrement, usize, f64)>> {
     prop::collection::vec((increment(), 0..3_usize, any_number()), 1..8)
 }
 
-/// An increment of more parts than any soil needs would never end.
+/// An increment with too many parts would take too long.
 #[test]
-fn parts_without_number_are_refused() {
+fn an_increment_with_too_many_parts_is_refused() {
     let sand = Parameters { dr: 0.55, g0: 677.0, hpo: 0.4, ..Parameters::default() };
     let sand = PM4Sand::new(sand, Options::default()).unwrap();
     let start = Stress { xx: -50.0, yy: -100.0, xy: 0.0, zz: -50.0 };

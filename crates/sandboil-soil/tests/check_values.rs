@@ -23,7 +23,7 @@ const CYCLIC: [(f64, [f64; 4], f64, f64); 3] = [
     (0.312, [73.33, 67.84, 62.03, 51.44], 13.96, 158.5),
 ];
 
-/// Calls `compare` with the stress of the monotonic tests and that of the table, kPa.
+/// Calls `compare` with each stress of the monotonic tests and the tabulated one, kPa.
 fn monotonic(integrator: &Integrator, host_increment: f64, compare: impl Fn(f64, f64)) {
     for (row, calibration) in CALIBRATIONS.into_iter().enumerate() {
         let sand = sand(calibration);
@@ -49,8 +49,8 @@ fn monotonic_reference() {
     });
 }
 
-/// The default clamps the plastic modulus while dilating (version 3.3), which these paths feel near the bounding
-/// surface.
+/// By default the plastic modulus is clamped during dilation (version 3.3); this changes the results slightly near the
+/// bounding surface.
 #[test]
 fn monotonic_default() {
     monotonic(&Integrator::default(), 1e-5, |ours, theirs| {
@@ -58,7 +58,7 @@ fn monotonic_default() {
     });
 }
 
-/// Load reversals are exact, so the answer depends neither on the host's step nor on the integrator.
+/// Load reversals are exact, so the result depends neither on the caller's increment nor on the integrator.
 #[test]
 fn cyclic() {
     let rk4 = Integrator::RungeKutta4 { max_increment: Integrator::DEFAULT_INCREMENT };

@@ -1,5 +1,5 @@
-//! PM4Sand at the ends of its range. Verdict of every test here: stable and finite, or refused, the bound stated
-//! (`docs/theory/pm4sand.md`, "Ends of the range").
+//! PM4Sand at the limits of its range. In every test the model is either stable and finite, or refuses the input;
+//! the limits are stated in `docs/theory/pm4sand.md`, "Ends of the range".
 
 mod point;
 
@@ -13,7 +13,7 @@ fn integrators() -> [Integrator; 3] {
     [Integrator::default(), rk4, Integrator::Reference]
 }
 
-/// Shear modulus coefficient at a relative density (Boulanger and Ziotopoulou 2017: `N = 46 D_R^2`).
+/// Calibration at a relative density: `G_o` from `N = 46 D_R^2` (Boulanger and Ziotopoulou 2017), `h_po = 0.5`.
 fn calibration_at(dr: f64) -> (f64, f64, f64) {
     (dr, 167.0 * (46.0 * dr * dr + 2.5).sqrt(), 0.5)
 }
@@ -45,7 +45,7 @@ fn loosest_and_densest_sand() {
     }
 }
 
-/// Contraction ends at `2 p_min` and dilation is forced below it: the pressure can only recover towards that.
+/// Contraction ends at `2 p_min`, and dilation is forced below it, so a lower pressure rises towards `2 p_min`.
 #[test]
 fn hundred_thousand_tiny_cycles_at_the_smallest_pressure() {
     let sand = sand(CALIBRATIONS[1]);
@@ -83,8 +83,8 @@ fn steps_from_1e_9_to_1e_2_reversed_every_time() {
     }
 }
 
-/// Inside the yield surface only the stress-dependent moduli keep a loop from closing: from an isotropic stress by
-/// round-off, from `K_0 = 0.5` by less than a tenth of the yield surface.
+/// Inside the yield surface a stress loop is open only because the moduli depend on stress. From an isotropic stress
+/// the drift is round-off; from `K_0 = 0.5` it is less than a tenth of the size of the yield surface.
 #[test]
 fn a_million_tiny_cycles_drift_little() {
     let sand = sand(CALIBRATIONS[1]);
@@ -102,7 +102,7 @@ fn a_million_tiny_cycles_drift_little() {
     }
 }
 
-/// Plastic cycles of 0.001 % amplitude: pressure falls and never below what liquefaction leaves.
+/// Plastic cycles of 0.001 % amplitude: pressure falls, but not below the residual pressure of liquefied sand.
 #[test]
 fn a_hundred_thousand_small_plastic_cycles_stay_bounded() {
     let sand = sand(CALIBRATIONS[1]);
@@ -117,8 +117,9 @@ fn a_hundred_thousand_small_plastic_cycles_stay_bounded() {
     assert_admissible(&sand, &state, "small plastic cycles");
 }
 
-/// Undrained simple shear between stresses of `bias` less and more `csr`, over the vertical stress, from a stress.
-#[expect(clippy::unwrap_used, reason = "the stress is one that the sand takes")]
+/// Undrained simple shear from an initial stress, between shear stresses of `bias - csr` and `bias + csr` times the
+/// vertical stress.
+#[expect(clippy::unwrap_used, reason = "the sand accepts this stress")]
 fn undrained(
     calibration: (f64, f64, f64),
     (start, bias, csr, count): (Stress, f64, f64, usize),
@@ -138,12 +139,13 @@ fn mean_stress(stress: &Stress) -> f64 {
     -0.5 * (stress.xx + stress.yy)
 }
 
-/// Steps and integrators under which a laboratory test must give one answer.
+/// Steps and integrators that must give the same result of a laboratory test.
 fn variants() -> impl Iterator<Item = (Integrator, f64)> {
     integrators().into_iter().flat_map(|integrator| [1e-5, 3e-6, 1e-6].map(|step| (integrator, step)))
 }
 
-/// Pressure lost in `cycles` of CSR 0.02 under every step and integrator, and the spread between these.
+/// Largest loss of pressure in a number of cycles at CSR 0.02, kPa, over all steps and integrators, and the spread
+/// between them.
 fn slow_loss(calibration: (f64, f64, f64), cycles: usize) -> (f64, f64) {
     let start = (anisotropic(), 0.0, 0.02, 2 * cycles);
     let lost: Vec<f64> = variants()
@@ -190,9 +192,9 @@ fn a_hundred_thousand_cycles_at_csr_of_a_fiftieth() {
     }
 }
 
-/// Far above what resists liquefaction: the looser the sand the sooner it strains to the limit.
+/// At a CSR far above the liquefaction resistance, looser sand reaches the strain limit sooner.
 #[test]
-fn csr_of_three_halves_strains_to_the_limit() {
+fn csr_of_three_halves_ends_at_the_strain_limit() {
     for (calibration, cycles) in CALIBRATIONS.into_iter().zip([0.137, 2.729, 7.200]) {
         for integrator in integrators() {
             let start = (anisotropic(), 0.0, 1.5, 60);
@@ -204,7 +206,7 @@ fn csr_of_three_halves_strains_to_the_limit() {
     }
 }
 
-/// Refused exactly where the stress ratio is outside both surfaces; stable where it is inside.
+/// An initial stress is refused exactly where its stress ratio is outside both surfaces; inside, the test is stable.
 #[test]
 fn earth_pressure_from_a_fifth_to_three_with_and_without_static_shear() {
     for calibration in CALIBRATIONS {
@@ -220,7 +222,7 @@ fn earth_pressure_from_a_fifth_to_three_with_and_without_static_shear() {
                 let bounding = c.critical_ratio * (-c.nb * state_index).exp();
                 assert!(
                     state_index < 0.0,
-                    "dense of critical, so that the bounding surface is the outer one"
+                    "the sand must be dense of critical, so that the bounding surface is the outer one"
                 );
                 let context = format!("D_R {}, K0 {k0}, bias {bias}: q/p {ratio} of {bounding}", c.dr);
                 assert_eq!(sand.carries(&start), ratio <= bounding, "{context}");

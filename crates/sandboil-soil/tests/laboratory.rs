@@ -1,4 +1,4 @@
-//! The specimen: mixed control, turns at the stress asked for, and cycles as they are counted.
+//! The specimen: mixed control, turns at the prescribed stress, and the number of cycles.
 
 mod point;
 
@@ -9,7 +9,7 @@ use sandboil_soil::{Integrator, Moduli, SoilError, SoilModel, StrainIncrement, S
 
 const STEP: f64 = 1e-5;
 
-#[expect(clippy::unwrap_used, reason = "the stress is one that every model takes")]
+#[expect(clippy::unwrap_used, reason = "every model accepts this stress")]
 fn specimen<M: SoilModel + 'static>(model: &M) -> Specimen {
     Specimen::new(model, anisotropic(), None, Integrator::default()).unwrap()
 }
@@ -25,7 +25,7 @@ fn cyclic(csr: f64, drained: bool, count: usize) -> Shear {
 }
 
 #[test]
-fn stress_turns_where_it_is_told_to_and_cycles_count_halves() {
+fn stress_turns_at_the_prescribed_values_and_each_turn_is_half_a_cycle() {
     for drained in [false, true] {
         let mut specimen = specimen(&sand(CALIBRATIONS[1]));
         let mut record = Record::new(Resolution::TURNS);
@@ -44,7 +44,7 @@ fn stress_turns_where_it_is_told_to_and_cycles_count_halves() {
 }
 
 #[test]
-fn a_stress_path_gives_back_the_strain_that_made_it() {
+fn a_stress_path_reproduces_the_strain_of_the_strain_path() {
     let rock = Elastic::new(4.0e4, 8.7e4).unwrap();
     let strains = vec![[1e-4, -2e-4, 3e-4], [-2e-4, -1e-4, -1e-4]];
     let mut record = Record::new(Resolution::TURNS);
@@ -67,7 +67,7 @@ fn a_stress_path_gives_back_the_strain_that_made_it() {
 }
 
 #[test]
-fn a_stress_that_the_sand_cannot_carry_ends_the_path_there() {
+fn a_stress_that_the_sand_cannot_carry_ends_the_path() {
     let mut specimen = specimen(&sand(CALIBRATIONS[1]));
     let mut record = Record::new(Resolution::TURNS);
     let rows = vec![[-0.5 * SIGMA_V0, -SIGMA_V0, 10.0], [-0.5 * SIGMA_V0, -SIGMA_V0, 90.0]];
@@ -80,7 +80,7 @@ fn a_stress_that_the_sand_cannot_carry_ends_the_path_there() {
 }
 
 #[test]
-fn a_copy_goes_on_as_the_specimen_would_have_and_leaves_it() {
+fn a_copy_continues_as_the_specimen_would_and_does_not_change_it() {
     let mut specimen = specimen(&sand(CALIBRATIONS[1]));
     specimen.shear(&cyclic(0.147, false, 3), &mut Record::new(Resolution::TURNS), &mut never);
     let (before, mut copy) = (specimen.stress(), specimen.copy());
@@ -96,7 +96,7 @@ fn simple_shear(turns: Vec<Turn>, drained: bool) -> Shear {
     Shear { drained, turns: Turns::Each(turns), strain_step: STEP, strain_limit: 0.05 }
 }
 
-/// A model of two straight branches: shear stress rises with strain to a peak and falls from there to nothing.
+/// A model with two straight branches: shear stress rises with strain to a peak and then falls to zero.
 #[derive(Debug, Clone)]
 struct Softening;
 
@@ -136,7 +136,7 @@ impl SoilModel for Softening {
 }
 
 #[test]
-fn a_softening_soil_that_never_reaches_the_turn_ends_at_the_strain_limit_without_going_back_in_cycles() {
+fn a_softening_soil_that_never_reaches_the_turn_ends_at_the_strain_limit_and_its_cycles_do_not_decrease() {
     let mut specimen = specimen(&Softening);
     let mut record = Record::new(Resolution::EVERY);
     let peak = SHEAR_MODULUS * PEAK_STRAIN;
@@ -148,7 +148,7 @@ fn a_softening_soil_that_never_reaches_the_turn_ends_at_the_strain_limit_without
     assert!(rows.iter().all(|row| (0.0..=0.75).contains(&row.cycle)));
 }
 
-/// The largest stress on the way is the turn itself, to round-off: the peak of a softening branch still counts.
+/// The turn equals the peak of a softening branch, to round-off.
 #[test]
 fn a_turn_exactly_at_the_peak_is_met() {
     let mut specimen = specimen(&Softening);
@@ -161,24 +161,24 @@ fn a_turn_exactly_at_the_peak_is_met() {
 }
 
 #[test]
-fn turns_may_be_where_the_specimen_already_is_or_behind_it() {
+fn turns_may_be_at_the_present_stress_or_behind_it() {
     for drained in [false, true] {
         let mut specimen = specimen(&sand(CALIBRATIONS[1]));
         let mut record = Record::new(Resolution::TURNS);
         let turns = [5.0, 5.0, 2.0, 1.0, 0.0, 0.0, -3.0].map(Turn::Stress).to_vec();
         assert_eq!(specimen.shear(&simple_shear(turns, drained), &mut record, &mut never), Ending::Complete);
         let found: Vec<f64> = record.rows().iter().map(|row| row.stress.xy).collect();
-        for (ours, wanted) in found.iter().zip([0.0, 5.0, 5.0, 2.0, 1.0, 0.0, 0.0, -3.0]) {
-            assert!((ours - wanted).abs() < 1e-6, "{found:?}");
+        for (ours, expected) in found.iter().zip([0.0, 5.0, 5.0, 2.0, 1.0, 0.0, 0.0, -3.0]) {
+            assert!((ours - expected).abs() < 1e-6, "{found:?}");
         }
         assert_eq!(record.rows().len(), 8);
         assert_eq!(record.rows().last().unwrap().cycle, 3.25);
     }
 }
 
-/// A second test goes on from the strain and stress of the first; its limit counts from there.
+/// A second test continues from the strain and stress of the first; its strain limit is relative to its start.
 #[test]
-fn alternating_turns_behind_the_start_go_back_first() {
+fn alternating_turns_behind_the_start_first_shear_backwards() {
     let mut specimen = specimen(&sand(CALIBRATIONS[1]));
     let mut record = Record::new(Resolution::TURNS);
     let test = simple_shear(vec![Turn::Stress(12.0)], false);
@@ -189,35 +189,35 @@ fn alternating_turns_behind_the_start_go_back_first() {
     assert_eq!(specimen.shear(&test, &mut record, &mut never), Ending::Complete);
     assert_eq!(record.rows().len(), 6);
     assert!(record.rows()[2].strain[2] < before);
-    for (row, wanted) in record.rows()[2..].iter().zip([8.0, -8.0, 8.0, -8.0]) {
-        assert!((row.stress.xy - wanted).abs() < 1e-6, "{row:?}");
+    for (row, expected) in record.rows()[2..].iter().zip([8.0, -8.0, 8.0, -8.0]) {
+        assert!((row.stress.xy - expected).abs() < 1e-6, "{row:?}");
     }
 }
 
-/// Distances between turns down to the round-off of the stress itself, and below.
+/// Distances between turns down to the round-off of the stress, and below.
 #[test]
-fn turns_a_hair_apart_end() {
+fn turns_very_close_together_are_completed() {
     for drained in [false, true] {
         let mut specimen = specimen(&sand(CALIBRATIONS[1]));
         let mut record = Record::new(Resolution::TURNS);
         let turns =
             [1.0, 1.0 + 1e-3, 1.0, 1.0 + 1e-6, 1.0, 1.0 + 1e-9, 1.0, 1.0 + 1e-12, 1.0, 1.0 + 1e-15, 1.0];
         let turns = turns.map(|share| Turn::Stress(10.0 * share)).to_vec();
-        let mut looks = 0;
-        let mut patience = || {
-            looks += 1;
-            looks > 100
+        let mut calls = 0;
+        let mut stop = || {
+            calls += 1;
+            calls > 100
         };
-        let ending = specimen.shear(&simple_shear(turns, drained), &mut record, &mut patience);
+        let ending = specimen.shear(&simple_shear(turns, drained), &mut record, &mut stop);
         assert_eq!(ending, Ending::Complete, "drained {drained}");
         assert!(record.rows().iter().skip(1).all(|row| (row.stress.xy - 10.0).abs() < 0.011), "{record:?}");
     }
 }
 
-/// Below `2 p_min`, here 1 kPa, the model's dilatancy jumps at the dilatancy surface, and no strain may give the
-/// stress: the test then says so, and whatever it has recorded is right.
+/// Below `2 p_min`, here 1 kPa, dilatancy of the model jumps at the dilatancy surface, and perhaps no strain gives the
+/// prescribed stress. The test then ends with [`Ending::StressNotCarried`], and all recorded rows are correct.
 #[test]
-fn drained_shear_at_low_pressure_holds_its_vertical_stress_or_says_that_it_cannot() {
+fn drained_shear_at_low_pressure_keeps_its_vertical_stress_or_ends_with_an_error() {
     for (pressure, may_fail) in [(0.6, true), (5.0, false)] {
         let start = Stress { xx: -0.5 * pressure, yy: -pressure, xy: 0.0, zz: -0.5 * pressure };
         let model = sand(CALIBRATIONS[1]);
@@ -233,7 +233,7 @@ fn drained_shear_at_low_pressure_holds_its_vertical_stress_or_says_that_it_canno
 }
 
 #[test]
-fn numbers_that_lead_nowhere_are_refused_before_the_first_increment() {
+fn invalid_numbers_are_refused_before_the_first_increment() {
     let refused = |ending: Ending| assert!(matches!(ending, Ending::Refused(_)), "{ending:?}");
     let mut specimen = specimen(&sand(CALIBRATIONS[1]));
     let mut record = Record::new(Resolution::EVERY);
@@ -262,7 +262,7 @@ fn numbers_that_lead_nowhere_are_refused_before_the_first_increment() {
     assert_eq!(specimen.strain(), [0.0; 3]);
 }
 
-/// Legs shorter than the time between two looks must not keep the caller waiting.
+/// `stop` is also called where every leg has fewer increments than the interval between two calls.
 #[test]
 fn many_short_legs_and_one_long_leg_can_be_interrupted() {
     let mut specimen = specimen(&sand(CALIBRATIONS[1]));
@@ -270,17 +270,17 @@ fn many_short_legs_and_one_long_leg_can_be_interrupted() {
     let test = cyclic(0.02, false, 100_000);
     assert_eq!(specimen.shear(&test, &mut record, &mut || true), Ending::Interrupted);
     assert!(record.rows().len() < 1000, "{}", record.rows().len());
-    let mut looks = 0;
+    let mut calls = 0;
     let mut second = || {
-        looks += 1;
-        looks > 1
+        calls += 1;
+        calls > 1
     };
     let path = Path { by_stress: [false; 3], rows: vec![[0.0, 0.0, 1.0]], strain_step: STEP };
     assert_eq!(specimen.path(&path, &mut record, &mut second), Ending::Interrupted);
     assert!(specimen.strain()[2] < 0.5);
 }
 
-/// What was done before a failure stays done and recorded, and the specimen can go on from there.
+/// Rows before a failure stay recorded, and the specimen can continue from its last state.
 #[test]
 fn a_path_that_fails_midway_leaves_a_usable_specimen() {
     let mut specimen = specimen(&sand(CALIBRATIONS[1]));
@@ -307,9 +307,9 @@ fn a_leg_of_no_length_is_one_row() {
     assert_eq!(specimen.strain(), [0.0; 3]);
 }
 
-/// A row is written where stress or strain has moved enough since the last one; turns and the end always.
+/// A row is recorded where stress or strain has changed enough since the last one; turns and the end always.
 #[test]
-fn resolution_keeps_what_moved_enough_in_stress_or_in_strain() {
+fn a_row_is_recorded_after_enough_change_of_stress_or_strain() {
     let run = |resolution: Resolution| {
         let mut record = Record::new(resolution);
         let rock = Elastic::new(4.0e4, 8.7e4).unwrap();
@@ -317,7 +317,7 @@ fn resolution_keeps_what_moved_enough_in_stress_or_in_strain() {
         assert_eq!(specimen(&rock).shear(&test, &mut record, &mut never), Ending::Complete);
         record.rows().len()
     };
-    // A hundred increments of 1e-5, or 0.4 kPa, and the start.
+    // The start, and a hundred increments of 1e-5, or 0.4 kPa.
     assert_eq!(run(Resolution::EVERY), 101);
     assert_eq!(run(Resolution::TURNS), 2);
     assert_eq!(run(Resolution { stress: f64::INFINITY, strain: 0.95e-4 }), 11);
@@ -326,13 +326,13 @@ fn resolution_keeps_what_moved_enough_in_stress_or_in_strain() {
 }
 
 #[test]
-fn the_allowed_strain_counts_from_the_start_of_each_shear() {
+fn the_strain_limit_is_relative_to_the_start_of_each_shear() {
     let mut specimen = specimen(&Elastic::new(4.0e4, 8.7e4).unwrap());
     for end in [0.04, 0.08, 0.0] {
         let turns = Turns::Each(vec![Turn::Strain(end)]);
         let test = Shear { drained: false, turns, strain_step: STEP, strain_limit: 0.05 };
         let ending = specimen.shear(&test, &mut Record::new(Resolution::TURNS), &mut never);
-        // From 8 % back to nothing is more than 5 %.
+        // From 8 % back to 0 is a change of more than 5 %.
         assert_eq!(ending, if end == 0.0 { Ending::StrainLimit } else { Ending::Complete });
     }
 }

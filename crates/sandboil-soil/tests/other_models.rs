@@ -1,4 +1,4 @@
-//! What every model beside PM4Sand must do for any state and strain, and the closed forms each must meet.
+//! Properties of every model except PM4Sand for any state and strain, and comparison with closed-form solutions.
 
 #![allow(clippy::unwrap_used, reason = "a failure here is a failure of the test")]
 
@@ -15,7 +15,7 @@ use sandboil_soil::{
     Integrator, Moduli, Soil, SoilError, SoilModel, StrainIncrement, Strength, Stress, with_model,
 };
 
-/// Round-off allowed of the size of the numbers it comes from.
+/// Allowed round-off, relative to the numbers that it comes from.
 const ROUND_OFF: f64 = 1e-12;
 
 const G: f64 = 9.1e4;
@@ -47,7 +47,7 @@ fn softening_cone() -> DruckerPrager {
     DruckerPrager::new(skeleton(), parameters).unwrap()
 }
 
-/// Slope and size of the usual cone, and of the general one, by their textbook formulas.
+/// Slope and size of the usual and of the general cone, by their textbook formulas.
 fn cone_constants(Strength { c, phi, psi }: Strength, matching: Matching) -> (f64, f64) {
     let (tan, sin) = (phi.to_radians().tan(), phi.to_radians().sin());
     let slope = |angle: f64| {
@@ -68,7 +68,7 @@ fn cone_excess(stress: &Stress, (a, k): (f64, f64)) -> f64 {
     stress.root_j2() + a * stress.first_invariant() - k
 }
 
-/// How far a stress with a plastic shear strain lies outside a surface, kPa.
+/// Yield function of a stress after a plastic shear strain, kPa.
 type Excess = Box<dyn Fn(&Stress, f64) -> f64>;
 
 struct Case {
@@ -131,12 +131,12 @@ fn cases() -> Vec<Case> {
     cases
 }
 
-/// With the moduli of the others at 100 kPa.
+/// Its moduli at 100 kPa are those of the other models.
 fn pressure_elastic() -> PressureElastic {
     PressureElastic::new(skeleton(), 0.5, 100.0).unwrap()
 }
 
-/// Principal stresses from the largest, kPa.
+/// Principal stresses in descending order, kPa.
 fn principal(stress: &Stress) -> [f64; 3] {
     let mut principal =
         [stress.plane_mean() + stress.radius(), stress.plane_mean() - stress.radius(), stress.zz];
@@ -155,7 +155,7 @@ fn pyramid(strength: Strength) -> MohrCoulomb {
     MohrCoulomb::new(skeleton(), strength, None).unwrap()
 }
 
-/// Undrained strength of 25 kPa that falls to 5 kPa, on the scale of 5 % plastic shear strain.
+/// Undrained strength of 25 kPa that decreases to 5 kPa, with a plastic shear strain scale of 5 %.
 fn clay(criterion: Criterion, decay: Option<Decay>) -> TotalStress {
     let softening = decay.map(|decay| total_stress::Softening { residual: 5.0, strain: 0.05, decay });
     TotalStress::new(skeleton(), criterion, 25.0, softening).unwrap()
@@ -204,7 +204,7 @@ fn difference(a: &Stress, b: &Stress) -> f64 {
     [a.xx - b.xx, a.yy - b.yy, a.xy - b.xy, a.zz - b.zz].into_iter().fold(0.0, |most, d| most.max(d.abs()))
 }
 
-/// Density of the work done from one stress to another, kJ/m3.
+/// Work per volume over a strain increment from one stress to another, kJ/m3.
 fn work(from: &Stress, to: &Stress, de: &StrainIncrement) -> f64 {
     0.5 * ((from.xx + to.xx) * de.xx + (from.yy + to.yy) * de.yy + (from.xy + to.xy) * de.xy)
 }
@@ -225,7 +225,7 @@ fn any_stress() -> impl Strategy<Value = Stress> {
     )
 }
 
-/// Fails unless every state of the path is finite and inside the surface.
+/// Fails unless every state of the path is finite and not outside the surface.
 fn stays_inside<M: SoilModel>(
     model: &M,
     excess: &dyn Fn(&Stress, f64) -> f64,
@@ -249,8 +249,8 @@ fn stays_inside<M: SoilModel>(
     }
 }
 
-/// Fails unless a spin on top of the strain turns the stress and changes nothing else. Strain comes in the axes of
-/// the end of a step.
+/// Fails unless an additional spin rotates the stress and changes nothing else. Strain is given in the axes at the end
+/// of a step.
 fn is_indifferent<M: SoilModel>(
     model: &M,
     start: Stress,
@@ -274,7 +274,7 @@ fn is_indifferent<M: SoilModel>(
     Ok(())
 }
 
-/// Fails unless numbers that mean nothing are refused and the state stays.
+/// Fails unless NaN, infinity and too large increments are refused and the state is unchanged.
 fn refuses<M: SoilModel>(model: &M) {
     let mut state = model.initialise(isotropic(50.0), None).unwrap();
     advance(model, &mut state, &strain_of(1e-4, -2e-4, 3e-4));
@@ -294,7 +294,7 @@ fn refuses<M: SoilModel>(model: &M) {
         let refusal = model.update(&mut state, &de, &Integrator::default());
         assert!(matches!(refusal, Err(SoilError::StrainIncrementTooLarge { .. })), "{model:?}: {refusal:?}");
     }
-    // No finite number gives a stress that is not.
+    // A finite increment gives a finite stress or an error.
     let de = strain_of(1e-5, 1e-5, 1e-5);
     for size in [1e150, 1e300, f64::MAX] {
         for sign in [1.0, -1.0] {
@@ -315,9 +315,8 @@ fn refuses<M: SoilModel>(model: &M) {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(256) })]
 
-    /// Whoever asks first is told of every start that would be replaced.
     #[test]
-    fn a_stress_is_carried_where_a_state_at_rest_keeps_it(stress in any_stress()) {
+    fn carries_is_true_exactly_where_initialise_keeps_the_stress(stress in any_stress()) {
         for Case { soil, .. } in cases() {
             with_model!(&soil, model => {
                 let kept = model.stress(&model.initialise(stress, None).unwrap()) == stress;
@@ -337,7 +336,7 @@ proptest! {
     }
 
     #[test]
-    fn spin_turns_the_stress_and_nothing_else(
+    fn spin_rotates_the_stress_and_changes_nothing_else(
         start in any_stress(),
         path in prop::collection::vec((increment(-6.0..-2.0), -0.5..0.5), 40),
     ) {
@@ -347,14 +346,14 @@ proptest! {
     }
 }
 
-/// Work of a closed strain path, over what was exchanged along it: none, though pressure comes and goes.
+/// The net work of a closed strain path is zero, relative to the work exchanged along it, also where pressure changes.
 #[test]
 fn closed_loops_inside_the_surface_cost_no_energy() {
     for Case { soil, .. } in cases() {
         with_model!(&soil, model => {
             let mut state = model.initialise(isotropic(100.0), None).unwrap();
             let (mut spent, mut exchanged) = (0.0, 0.0);
-            // Compression, where no surface is near.
+            // In compression, far from any surface.
             let corners = [(-3.0, -3.0, 0.0), (-3.0, -3.0, 1.0), (-1.0, -1.0, 0.5), (0.0, 0.0, 0.0)];
             let mut at = (0.0, 0.0, 0.0);
             for corner in corners {
@@ -372,7 +371,7 @@ fn closed_loops_inside_the_surface_cost_no_energy() {
 }
 
 #[test]
-fn numbers_that_mean_nothing_are_refused() {
+fn numbers_that_are_not_finite_or_too_large_are_refused() {
     for Case { soil, .. } in cases() {
         with_model!(&soil, model => refuses(model));
     }
@@ -397,7 +396,7 @@ fn steps_from_1e_9_to_10_reversed_every_time_stay_inside() {
 }
 
 #[test]
-fn inside_the_surface_the_answer_is_that_of_elasticity() {
+fn inside_the_surface_the_stress_is_elastic() {
     for Case { soil, .. } in cases() {
         with_model!(&soil, model => {
             let mut state = model.initialise(isotropic(100.0), None).unwrap();
@@ -419,9 +418,9 @@ fn inside_the_surface_the_answer_is_that_of_elasticity() {
     }
 }
 
-/// Along a straight strain path from an isotropic stress the flow keeps its direction: the return is exact.
+/// On a straight strain path from an isotropic stress, the flow direction is constant, so the return is exact.
 #[test]
-fn perfect_plasticity_does_not_see_the_step_on_a_straight_path() {
+fn perfect_plasticity_is_independent_of_the_step_on_a_straight_path() {
     let direction = strain_of(1e-3, -3e-3, 2e-3);
     for Case { soil, .. } in cases() {
         let ends = [1, 7, 64].map(|parts| {
@@ -435,7 +434,7 @@ fn perfect_plasticity_does_not_see_the_step_on_a_straight_path() {
                 (model.stress(&state), model.plastic_shear_strain(&state).unwrap_or(0.0))
             })
         });
-        // Softening with dilatancy takes the flow at the beginning of a step; all else is exact.
+        // Softening with dilatancy uses the flow direction at the beginning of the step; all other cases are exact.
         let dilates_less = matches!(&soil, Soil::DruckerPrager(model) if *model == softening_cone());
         let allowed = if dilates_less { 0.02 } else { 1e-11 };
         for (stress, plastic) in &ends[1..] {
@@ -445,7 +444,7 @@ fn perfect_plasticity_does_not_see_the_step_on_a_straight_path() {
     }
 }
 
-/// Shear with the in-plane mean stress held, the volume free: the radius of Mohr's circle at the end.
+/// Radius of Mohr's circle at failure, kPa, in shear at constant in-plane mean stress.
 fn radius_at_failure<M: SoilModel>(model: &M, mean: f64) -> f64 {
     let mut state = model.initialise(isotropic(-mean), None).unwrap();
     for _ in 0..4000 {
@@ -489,9 +488,8 @@ fn strength_at_failure_in_plane_strain() {
     }
 }
 
-/// Both give the same strength at failure in plane strain, whatever the dilatancy.
 #[test]
-fn mohr_coulomb_is_what_the_general_cone_becomes_at_failure() {
+fn the_general_cone_has_the_mohr_coulomb_strength_at_failure_for_any_dilatancy() {
     for peak in [strength(5.0, 30.0, 0.0), strength(5.0, 30.0, 30.0), strength(0.0, 37.0, 5.0)] {
         let (pyramid, cone) = (pyramid(peak), drucker_prager(peak, Matching::General));
         let expected = mohr_coulomb_radius(peak, -50.0);
@@ -501,7 +499,7 @@ fn mohr_coulomb_is_what_the_general_cone_becomes_at_failure() {
     }
 }
 
-/// Compression along y with the lateral stress held, to the end.
+/// Stress at failure, kPa, in compression along y at constant lateral stress.
 fn compressed<M: SoilModel>(model: &M, lateral: f64) -> Stress {
     let mut state = model.initialise(isotropic(-lateral), None).unwrap();
     for _ in 0..4000 {
@@ -539,7 +537,7 @@ fn strength_in_plane_strain_compression() {
     }
 }
 
-/// Without dilatancy `I1 = 3 K e_v` to the end, and the shear stress is elastic up to the cone and then the cone's.
+/// Without dilatancy, `I1 = 3 K e_v` throughout; `sqrt(J2)` is elastic up to the cone and then lies on the cone.
 #[test]
 fn oedometric_compression() {
     let bulk = 0.8 * G;
@@ -557,7 +555,7 @@ fn oedometric_compression() {
         assert!((stress.first_invariant() - first_invariant).abs() <= 1e-10 * first_invariant.abs());
         assert!((stress.root_j2() - expected).abs() <= 1e-10 * expected, "{step}");
         assert!((stress.xx - stress.zz).abs() <= 1e-10 * stress.xx.abs());
-        assert_eq!(expected < elastic, step > 3, "the soil yields in the fourth step");
+        assert_eq!(expected < elastic, step > 3, "the soil must yield in the fourth step");
     }
 }
 
@@ -573,9 +571,9 @@ fn without_dilatancy_plastic_flow_keeps_volume() {
     assert!((stress.first_invariant() + 300.0).abs() < 1e-9, "{stress:?}");
 }
 
-/// Dilatancy angle in plane strain: `sin(psi) = -d(e_v)/d(gamma)` of plastic strain.
+/// Dilatancy angle in plane strain: `sin(psi) = -d(e_v)/d(gamma)` of plastic strain, compression positive.
 #[test]
-fn the_flow_dilates_by_its_angle() {
+fn plastic_flow_has_the_dilation_angle() {
     let psi = 10.0;
     for matching in [Matching::Usual, Matching::General] {
         let soil = drucker_prager(strength(5.0, 30.0, psi), matching);
@@ -619,9 +617,9 @@ fn hydrostatic_tension_ends_at_the_apex() {
     }
 }
 
-/// `int k d(gamma) = (k_p + k_r)/2 kappa_s` while the strength falls, `k_r` after.
+/// `int k d(gamma) = (k_p + k_r)/2 kappa_s` during softening; after it, `k_r` per unit of shear strain.
 #[test]
-fn softening_ends_at_the_residual_and_costs_the_area_under_it() {
+fn softening_ends_at_the_residual_strength_and_dissipates_the_area_under_the_curve() {
     let softening = Softening { residual: strength(8.0, 0.0, 0.0), strain: 0.02 };
     let parameters =
         Parameters { softening: Some(softening), ..cone(strength(20.0, 0.0, 0.0), Matching::Usual) };
@@ -643,7 +641,7 @@ fn softening_ends_at_the_residual_and_costs_the_area_under_it() {
     assert!((spent / expected - 1.0).abs() < 1e-6, "{spent} {expected}");
 }
 
-/// One step through the softening or many: the same end, for the strength at the end of each step is implicit.
+/// The end state of softening converges with the step size; the strength at the end of each step is implicit.
 #[test]
 fn softening_converges_with_the_step() {
     let soil = softening_cone();
@@ -662,9 +660,9 @@ fn softening_converges_with_the_step() {
     assert!(errors[3] < 1e-2 * size_of(&exact), "{errors:?}");
 }
 
-/// At a pressure where friction falls faster than `G` unloads, the point drops to its residual strength at once.
+/// At a pressure where frictional strength falls faster than `G`, the point drops to its residual strength in one step.
 #[test]
-fn brittle_softening_drops_to_the_residual() {
+fn brittle_softening_drops_to_the_residual_strength() {
     let softening = Softening { residual: strength(1.0, 10.0, 0.0), strain: 1e-3 };
     let parameters =
         Parameters { softening: Some(softening), ..cone(strength(1.0, 40.0, 0.0), Matching::General) };
@@ -716,10 +714,10 @@ fn dissipates<M: SoilModel>(soil: &M) {
     assert!(total > 0.01, "{soil:?}: {total} kPa");
 }
 
-/// The return solves a problem with one answer: stress inside, plastic strain along the active flows with no negative
-/// share, and no flow of a plane that is not reached. A search over all combinations of planes finds the same.
+/// The return has a unique solution: admissible stress, non-negative flow on the active planes, no flow on the others.
+/// A search over all combinations of planes must find the same solution.
 #[test]
-fn the_pyramid_returns_to_the_only_answer() {
+fn the_return_to_the_pyramid_is_the_unique_solution() {
     let mut generator = 1_u64;
     let mut random = move || {
         generator = generator.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -749,7 +747,7 @@ fn the_pyramid_returns_to_the_only_answer() {
             let on_edge =
                 (largest - middle).min(middle - smallest) < 1e-9 * size && largest - smallest > 1e-6;
             edges += i32::from(on_edge);
-            // The principal directions in the plane stay.
+            // The principal directions in the plane do not change.
             let (before, after) = (trial.plane_deviator(), state.plane_deviator());
             let cross = before.half_difference * after.xy - before.xy * after.half_difference;
             assert!(cross.abs() <= 1e-9 * size * size);
@@ -758,8 +756,8 @@ fn the_pyramid_returns_to_the_only_answer() {
     assert!(edges > 500, "{edges} returns to an edge");
 }
 
-/// Principal stresses admitted for ordered trial ones, from the flow rule alone: of one plane, of two, of all three at
-/// the apex.
+/// Principal stresses after the return of ordered trial ones, found from the flow rule by trial: one plane, two planes,
+/// or the apex.
 fn searched(trial: [f64; 3], Strength { c, phi, psi }: Strength) -> [f64; 3] {
     let (sin, cos) = phi.to_radians().sin_cos();
     let dilation = psi.to_radians().sin();
@@ -810,22 +808,22 @@ fn searched(trial: [f64; 3], Strength { c, phi, psi }: Strength) -> [f64; 3] {
     [c * cos / sin; 3]
 }
 
-/// An out-of-plane stress that is the smallest flows as an in-plane one would.
+/// Flow is the same for an out-of-plane smallest principal stress as for an in-plane one.
 #[test]
-fn the_out_of_plane_stress_may_decide() {
+fn the_out_of_plane_stress_may_govern_failure() {
     let peak = strength(5.0, 30.0, 0.0);
     let soil = pyramid(peak);
     let start = Stress { xx: -50.0, yy: -50.0, xy: 0.0, zz: passive_strength(peak, -50.0) };
     let mut state = soil.initialise(start, None).unwrap();
     assert!(difference(&state, &start) < 1e-10);
-    // Stretching the plane unloads its stresses: the out-of-plane one must follow.
+    // Stretching in the plane unloads the in-plane stresses; the out-of-plane stress must follow.
     advance(&soil, &mut state, &strain_of(2e-5, 2e-5, 0.0));
     assert!(state.xx > -50.0 && (state.zz - passive_strength(peak, state.xx)).abs() < 1e-9, "{state:?}");
     assert!((state.xx - state.yy).abs() < 1e-10);
 }
 
 #[test]
-fn the_pyramid_ends_at_its_apex_or_cut_off() {
+fn hydrostatic_tension_of_the_pyramid_ends_at_its_apex_or_cut_off() {
     let peak = strength(14.4, 31.0, 10.0);
     let apex = 14.4 / 31.0_f64.to_radians().tan();
     for (cutoff, tension) in [(None, apex), (Some(10.0), 10.0), (Some(0.0), 0.0)] {
@@ -843,7 +841,7 @@ fn the_pyramid_ends_at_its_apex_or_cut_off() {
 fn undrained_strength_is_the_radius_at_failure() {
     let tresca = clay(Criterion::Tresca, None);
     let von_mises = clay(Criterion::VonMises, None);
-    // An out-of-plane stress far from the mean: it must flow there before von Mises gives all its strength.
+    // The out-of-plane stress starts far from the in-plane mean; von Mises has its full strength only at that mean.
     let start = Stress { zz: -80.0, ..isotropic(100.0) };
     let (mut a, mut b) =
         (tresca.initialise(start, None).unwrap(), von_mises.initialise(start, None).unwrap());
@@ -858,7 +856,7 @@ fn undrained_strength_is_the_radius_at_failure() {
             least = least.min(von_mises.stress(&b).radius());
         }
     }
-    assert!(least < 24.99, "{least}: the out-of-plane stress does not show");
+    assert!(least < 24.99, "{least}: the out-of-plane stress must reduce the strength");
     let end = von_mises.stress(&b);
     assert!((end.radius() - 25.0).abs() < 1e-9 && (end.zz - end.plane_mean()).abs() < 1e-6, "{end:?}");
     assert_eq!(tresca.stress(&a).zz, -80.0);
@@ -878,10 +876,10 @@ fn undrained_flow_keeps_volume() {
     }
 }
 
-/// Closed form of the area under the strength: the part above the residual is worth `kappa_s` (exponential) or half of
-/// it (linear).
+/// Closed form of the area under the strength curve: above the residual strength it is `S_u - S_r` times `kappa_s`
+/// (exponential) or times half of it (linear).
 #[test]
-fn undrained_softening_costs_the_area_under_it() {
+fn undrained_softening_dissipates_the_area_under_the_strength_curve() {
     for criterion in [Criterion::Tresca, Criterion::VonMises] {
         for decay in [Decay::Exponential, Decay::Linear] {
             let clay = clay(criterion, Some(decay));
@@ -955,9 +953,9 @@ fn impossible_strengths_are_refused() {
     }
 }
 
-/// One update for each place where tension ends: inside nothing is counted, on the cone or a plane neither.
+/// Only updates that end at an apex or a cut-off are counted, not those inside or on the rest of the surface.
 #[test]
-fn ends_at_an_apex_or_a_cut_off_are_counted() {
+fn returns_to_an_apex_or_a_cut_off_are_counted() {
     let peak = strength(14.4, 31.0, 10.0);
     let apex = 14.4 / 31.0_f64.to_radians().tan();
     let counted = |soil: &Soil, pressure: f64, de: &StrainIncrement| {
@@ -982,7 +980,7 @@ fn ends_at_an_apex_or_a_cut_off_are_counted() {
             assert_eq!(counted(&soil, 20.0, &tension), in_tension, "{soil:?}");
         }
     }
-    // Without friction there is no apex, and no tension is too much.
+    // Without friction there is no apex, and tension is unlimited.
     let clay = strength(20.0, 0.0, 0.0);
     let cone = Soil::DruckerPrager(drucker_prager(clay, Matching::Usual));
     for soil in [cone, Soil::MohrCoulomb(pyramid(clay))] {

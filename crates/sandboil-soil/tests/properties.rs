@@ -1,5 +1,5 @@
-//! What PM4Sand must do for any state and strain: admissible, objective, symmetric, free of units and of the host's
-//! step; and where its paths must end.
+//! Properties of PM4Sand for any state and strain: admissible, objective and symmetric results, independent of units
+//! and of the caller's step size. Also the end states of long paths.
 
 mod point;
 
@@ -14,7 +14,7 @@ use sandboil_soil::{Deviator, Integrator, SoilError, SoilModel, StrainIncrement,
 /// Yield tolerance over atmospheric pressure.
 const YIELD_TOLERANCE: f64 = 1e-8;
 
-/// Excess over the bounding ratio that one sub-step makes, relative.
+/// Allowed relative excess over the bounding ratio after one sub-step.
 const BOUNDING_TOLERANCE: f64 = 1e-4;
 
 const MEDIUM: (f64, f64, f64) = CALIBRATIONS[1];
@@ -23,7 +23,7 @@ fn rk4() -> Integrator {
     Integrator::RungeKutta4 { max_increment: Integrator::DEFAULT_INCREMENT }
 }
 
-/// Mean and deviator of a stress in a material frame that has not turned, compression positive.
+/// Mean and deviator of a stress, kPa, in an unrotated material frame, compression positive.
 fn split(stress: &Stress) -> (f64, Deviator) {
     let half_difference = -0.5 * (stress.xx - stress.yy);
     (-0.5 * (stress.xx + stress.yy), Deviator { half_difference, xy: -stress.xy })
@@ -45,9 +45,9 @@ fn strain_of(xx: f64, yy: f64, xy: f64) -> StrainIncrement {
     StrainIncrement { xx, yy, xy, spin: 0.0 }
 }
 
-/// The model leaves the out-of-plane stress to elasticity: its distance to the mean changes with volume alone.
+/// The out-of-plane stress is elastic, so its difference from the mean stress changes only with volume.
 #[test]
-fn out_of_plane_stress_keeps_its_distance_to_the_mean_at_constant_volume() {
+fn out_of_plane_stress_keeps_its_difference_from_the_mean_at_constant_volume() {
     for integrator in [Integrator::default(), rk4()] {
         let sand = sand(MEDIUM);
         let mut state = consolidated(&sand);
@@ -60,9 +60,9 @@ fn out_of_plane_stress_keeps_its_distance_to_the_mean_at_constant_volume() {
     }
 }
 
-/// What a part compresses beyond the closing of the gap builds up stress, and no more than that.
+/// Only the compression after the gap has closed increases the stress.
 #[test]
-fn a_part_that_closes_the_gap_compresses_the_soil_by_the_rest() {
+fn a_part_that_closes_the_gap_compresses_the_soil_by_the_remaining_strain() {
     let sand = sand_with(MEDIUM, Options { gap_memory: true, ..Options::default() });
     let volume = |change: f64| strain_of(0.5 * change, 0.5 * change, 0.0);
     let mut state = consolidated(&sand);
@@ -84,11 +84,13 @@ fn a_part_that_closes_the_gap_compresses_the_soil_by_the_rest() {
     assert!(whole > 1.01 * floor && (whole / parts - 1.0).abs() < 1e-9, "{whole} {parts}");
 }
 
-/// Exponents of increments that stay clear of the bounding surface. On it a turning direction meets the infinite
-/// hardening of the image point, and round-off decides where a sub-step ends (`docs/theory/pm4sand.md`).
+/// Exponents of increments for paths that stay inside the bounding surface. On that surface hardening is infinite at
+/// the image point, so with a changing direction the end of a sub-step depends on round-off
+/// (`docs/theory/pm4sand.md`).
 const GENTLE: std::ops::Range<f64> = -6.0..-4.5;
 
-/// A strain increment with components up to `10^exponent` of the range, volume change a tenth of the shear.
+/// A strain increment with components up to `10^exponent`, with the exponent from the range; the volume change is a
+/// tenth of the shear.
 fn increment(exponents: std::ops::Range<f64>) -> impl Strategy<Value = StrainIncrement> {
     (exponents, -1.0..1.0, -1.0..1.0, -0.1..0.1).prop_map(
         |(exponent, xy, difference, volume): (f64, f64, f64, f64)| {
@@ -98,7 +100,7 @@ fn increment(exponents: std::ops::Range<f64>) -> impl Strategy<Value = StrainInc
     )
 }
 
-/// Effective stress with `p` from the smallest pressure to 5000 kPa and a stress ratio up to the critical one.
+/// Effective stress with `p` from the smallest pressure to 5000 kPa, and a stress ratio up to the critical one.
 fn initial_stress() -> impl Strategy<Value = Stress> {
     (-0.3..3.7, 0.0..1.08, 0.0..std::f64::consts::TAU).prop_map(
         |(exponent, ratio, angle): (f64, f64, f64)| {
@@ -131,14 +133,14 @@ proptest! {
         let sand = sand(calibration);
         let mut state = sand.initialise(stress, None).unwrap();
         let floor = 0.2 * state.minimum_pressure();
-        // The offset of a start below the smallest pressure belongs to the host's stress alone.
+        // An initial stress below `p_min` has an offset, which is no part of the stress in the model.
         let offset = state.mean_stress() - split(&sand.stress(&state)).0;
         for de in path {
             advance(&sand, &mut state, &de, &integrator);
             prop_assert!(state.mean_stress() >= floor * (1.0 - 1e-12));
             if offset.abs() < 1e-12 * state.mean_stress() {
                 let f = yield_function(&sand, &state);
-                // Beyond the tolerance only the round-off of the stress itself.
+                // The tolerance, plus round-off of the stress.
                 let allowed = YIELD_TOLERANCE * 101.3 + 1e-15 * state.mean_stress();
                 prop_assert!(f <= allowed, "f = {f} kPa at p = {} kPa", state.mean_stress());
             }
@@ -146,7 +148,7 @@ proptest! {
     }
 
     #[test]
-    fn spin_turns_the_stress_and_nothing_else(
+    fn spin_rotates_the_stress_and_changes_nothing_else(
         path in prop::collection::vec((increment(GENTLE), -0.02..0.02_f64), 60),
         integrator in integrator(),
     ) {
@@ -206,7 +208,7 @@ proptest! {
     }
 
     #[test]
-    fn one_step_or_many_equal_parts_are_the_same(path in prop::collection::vec(increment(GENTLE), 40)) {
+    fn one_step_and_its_equal_parts_give_the_same_stress(path in prop::collection::vec(increment(GENTLE), 40)) {
         let sand = sand(MEDIUM);
         let max_increment = 2.5e-6;
         for integrator in [
@@ -227,7 +229,7 @@ proptest! {
         }
     }
 
-    /// The cap takes the surface of the last evaluation, which trails the committed state by less than one part.
+    /// The cap uses the bounding ratio of the last evaluation, less than one part before the committed state.
     #[test]
     fn no_commit_is_outside_the_bounding_surface(
         calibration in calibration(),
@@ -239,7 +241,7 @@ proptest! {
         let mut state = sand.initialise(stress, None).unwrap();
         for de in path {
             advance(&sand, &mut state, &de, &integrator);
-            // A start below the smallest pressure leaves an offset, which is not the model's own stress.
+            // An initial stress below `p_min` has an offset, which is no part of the stress in the model.
             if !state.has_offset() {
                 let (p, s) = split(&sand.stress(&state));
                 let ratio = 2.0_f64.sqrt() * s.norm() / p.max(state.minimum_pressure());
@@ -249,8 +251,8 @@ proptest! {
         }
     }
 
-    /// From an isotropic stress and at constant volume, where the moduli change along the loop by no more than the
-    /// fourth power of a tiny stress ratio.
+    /// The loop starts at an isotropic stress and keeps the volume, so the moduli change only with the fourth power of
+    /// a small stress ratio.
     #[test]
     fn a_closed_loop_inside_the_yield_surface_costs_no_energy(
         calibration in calibration(),
@@ -317,10 +319,10 @@ proptest! {
     }
 }
 
-/// Reversals are looked for once per part, so a step divided into parts that do not line up finds them at other
-/// strains: that is what is left of the host's step. Relative difference of stress over a set of random paths of 40
-/// steps up to 3e-5, each divided into up to seven: its median, ninth decile and largest value.
-#[expect(clippy::unwrap_used, reason = "a strategy that cannot fail and a stress that the sand takes")]
+/// Effect of the caller's step on the result. Reversals are detected once per part, so a step that is divided
+/// differently detects them at other strains. Returns median, ninth decile and largest value of the relative stress
+/// difference over random paths of 40 steps up to 3e-5, each step divided into up to seven.
+#[expect(clippy::unwrap_used, reason = "the strategy cannot fail and the sand accepts this stress")]
 fn scatter_by_division(simple_shear: bool, integrator: &Integrator) -> [f64; 3] {
     const PATHS: usize = 200;
     let mut runner = TestRunner::deterministic();
@@ -348,7 +350,7 @@ fn scatter_by_division(simple_shear: bool, integrator: &Integrator) -> [f64; 3] 
 }
 
 #[test]
-fn a_step_divided_otherwise_gives_nearly_the_same() {
+fn a_step_divided_differently_gives_nearly_the_same_stress() {
     for integrator in [Integrator::default(), rk4(), Integrator::Reference] {
         for (simple_shear, allowed) in [(true, [5e-5, 1e-4, 0.02]), (false, [5e-4, 0.01, 0.1])] {
             let found = scatter_by_division(simple_shear, &integrator);
@@ -358,7 +360,7 @@ fn a_step_divided_otherwise_gives_nearly_the_same() {
     }
 }
 
-/// From an isotropic stress, where the moduli do not change along the loop but for the fourth power of a tiny ratio.
+/// The loop starts at an isotropic stress, so the moduli change only with the fourth power of a small stress ratio.
 #[test]
 fn a_loop_inside_the_yield_surface_is_elastic() {
     let sand = sand(MEDIUM);
@@ -394,7 +396,7 @@ fn unloading_from_the_bounding_surface_is_stiff_at_once() {
 }
 
 #[test]
-fn expansion_to_the_pressure_floor_is_cheap() {
+fn expansion_to_the_pressure_floor_needs_few_evaluations() {
     for integrator in [Integrator::default(), rk4(), Integrator::Reference] {
         let sand = sand(MEDIUM);
         let mut state = consolidated(&sand);
@@ -410,8 +412,8 @@ fn expansion_to_the_pressure_floor_is_cheap() {
     }
 }
 
-/// `p = (p_A/100) exp(Q - R/D_R)` and `q/p = 2 sin(phi_cv)` at constant volume. For the dense calibration that
-/// pressure lies above 2000 kPa, beyond the strain of this test.
+/// At constant volume the critical state is `p = (p_A/100) exp(Q - R/D_R)`, `q/p = 2 sin(phi_cv)`. The dense
+/// calibration is left out: its critical pressure is above 2000 kPa and is not reached within the strain of this test.
 #[test]
 fn shear_at_constant_volume_ends_at_the_critical_state() {
     for calibration in &CALIBRATIONS[..2] {
@@ -428,8 +430,8 @@ fn shear_at_constant_volume_ends_at_the_critical_state() {
     }
 }
 
-/// Shear at constant vertical stress: volume changes until the density is the critical one for the pressure,
-/// whichever side it starts from.
+/// Shear at constant vertical stress: from the loose and from the dense side, volume changes until density is the
+/// critical one at the final pressure.
 #[test]
 fn drained_shear_ends_at_the_critical_density() {
     let loose = (0.15, 320.0, 0.5);
@@ -463,8 +465,8 @@ fn drained_shear_ends_at_the_critical_density() {
     }
 }
 
-/// On first loading fabric is zero, and from an isotropic stress loading is along one direction: contraction turns
-/// into dilation where the stress ratio passes `M^d`.
+/// During first loading from an isotropic stress, fabric is zero and the loading direction is constant. Dilation then
+/// begins where the stress ratio passes `M^d`.
 #[test]
 fn dilation_begins_at_the_dilatancy_surface() {
     for calibration in CALIBRATIONS {
@@ -503,9 +505,9 @@ fn a_stabilised_loop_dissipates() {
     assert!(work > 0.0);
 }
 
-/// `F_sed` from its formula, with the constants of the middle calibration spelt out.
+/// `F_sed` is computed here from its formula.
 #[test]
-fn post_shaking_lowers_the_moduli_by_its_factor_alone() {
+fn post_shaking_multiplies_the_moduli_by_its_factor_only() {
     let shaking = sand(MEDIUM);
     let settling = sand_with(MEDIUM, Options { post_shaking: true, ..Options::default() });
     let c = shaking.parameters();
@@ -526,7 +528,7 @@ fn post_shaking_lowers_the_moduli_by_its_factor_alone() {
     let p_sed = c.p_sed_o * state.cumulative_fabric() / (state.cumulative_fabric() + limit)
         * (1.0 - ratio / dilatancy).max(0.0).powf(0.25);
     let expected = (c.f_sed_min + (1.0 - c.f_sed_min) * p / (20.0 * p_sed)).min(1.0);
-    assert!(expected < 0.9, "{expected}: the state does not show the reduction");
+    assert!(expected < 0.9, "{expected}: the state must have a clear reduction");
 
     let mut switched = state;
     settling.refresh_moduli(&mut switched);
@@ -537,7 +539,7 @@ fn post_shaking_lowers_the_moduli_by_its_factor_alone() {
     assert_eq!(switched, state);
 }
 
-/// Sub-steps within half of `m p/G`: at twice `m p/G` Runge-Kutta is wrong without a warning.
+/// Sub-steps are at most half of `m p/G`; at twice `m p/G`, Runge-Kutta is wrong without a warning.
 #[test]
 fn runge_kutta_keeps_its_sub_steps_stable() {
     let sand = sand(MEDIUM);
@@ -550,14 +552,14 @@ fn runge_kutta_keeps_its_sub_steps_stable() {
             let p = state.mean_stress().max(state.minimum_pressure());
             let bound = 0.5 * sand.parameters().m * p / sand.moduli(&state).shear;
             let substeps = advance(&sand, &mut state, &shear(direction * 2e-5), &rk4()).substeps;
-            // Dilation raises the pressure, and with it the bound, within the step.
+            // Dilation increases the pressure within the step, and the bound with it.
             let raised = state.mean_stress().max(p) / p;
             assert!(substeps as f64 * bound * raised >= 0.9 * 2e-5 - bound, "{substeps}");
         }
     }
 }
 
-/// End of a first loading to 3.2e-4 shear strain in equal parts without error control.
+/// Stress after first loading to a shear strain of 3.2e-4, in equal parts.
 fn first_loading(integrator: &Integrator, part: f64) -> Stress {
     let sand = sand(MEDIUM);
     let mut state = consolidated(&sand);
@@ -585,9 +587,9 @@ fn order_of_convergence_on_first_loading() {
     assert!(runge_kutta.into_iter().all(|order| order > 3.0), "{runge_kutta:?}");
 }
 
-/// Dense sand that is sheared until it slides meets its bounding surface, which is counted; before, it does not.
+/// Dense sand reaches its bounding surface after long shear, not at the beginning.
 #[test]
-fn stresses_taken_back_to_the_bounding_surface_are_counted() {
+fn stresses_returned_to_the_bounding_surface_are_counted() {
     let sand = sand(CALIBRATIONS[2]);
     let mut state = consolidated(&sand);
     let mut sheared = |steps: u32| {

@@ -5,7 +5,7 @@ mod point;
 use point::{CALIBRATIONS, StrainPath, advance, parts, sand, shear};
 use sandboil_soil::{Integrator, SoilModel, StrainIncrement, Stress};
 
-/// Allowed rms difference of stress, kPa: ten times the reference's own uncertainty on the first two paths.
+/// Allowed rms difference of stress, kPa: ten times the uncertainty of the reference on the first two paths.
 const ALLOWED_RMS: f64 = 0.01;
 
 #[test]
@@ -29,7 +29,7 @@ fn rows_are_whole_commits_apart() {
     }
 }
 
-/// On the third path a reversal is nearly neutral: the reference itself moves by 0.1 kPa with twice its commit.
+/// On the third path a reversal is nearly neutral: the reference changes by 0.1 kPa if its commits are twice as large.
 #[test]
 fn default_part_finds_the_reversals_of_the_reference() {
     let rk4 = Integrator::RungeKutta4 { max_increment: Integrator::DEFAULT_INCREMENT };
@@ -45,9 +45,9 @@ fn default_part_finds_the_reversals_of_the_reference() {
 }
 
 /// Mean stress, kPa, after six cycles of biaxial strain of 0.2 % from an isotropic stress of 100 kPa, in dense sand.
-/// Shear strain goes on all the while: forward by `forward` of the biaxial strain in the first two cycles, then back
-/// by `back` of it. Host steps are parts of `step`.
-#[expect(clippy::unwrap_used, reason = "the stress is one that the sand takes")]
+/// At the same time shear strain increases by `forward` times the biaxial strain in the first two cycles, and then
+/// decreases by `back` times the biaxial strain. `step` is the biaxial strain of one increment.
+#[expect(clippy::unwrap_used, reason = "the sand accepts this stress")]
 fn biaxial_cycles_with_shear([forward, back]: [f64; 2], integrator: &Integrator, step: f64) -> f64 {
     const AMPLITUDE: f64 = 2e-3;
     const HALF_CYCLES: u32 = 12;
@@ -61,13 +61,13 @@ fn biaxial_cycles_with_shear([forward, back]: [f64; 2], integrator: &Integrator,
         let de = StrainIncrement { xx: size, yy: -size, xy, spin: 0.0 };
         for _ in 0..parts(&shear(AMPLITUDE), step).0 {
             let report = advance(&sand, &mut state, &de, integrator);
-            assert_eq!(report.near_neutral_reversals, 0, "no counter warns of such a path");
+            assert_eq!(report.near_neutral_reversals, 0, "the counter does not detect such a path");
         }
     }
     state.mean_stress()
 }
 
-/// Parts for the examples of `docs/theory/pm4sand.md`, "Answers that need not converge".
+/// Step sizes for the examples of `docs/theory/pm4sand.md`, "Answers that need not converge".
 const STEPS: [f64; 5] = [1e-5, 5e-6, 4e-6, 2.5e-6, 1e-6];
 
 fn with_parts_of(max_increment: f64) -> [Integrator; 3] {
@@ -76,7 +76,7 @@ fn with_parts_of(max_increment: f64) -> [Integrator; 3] {
     [euler, Integrator::RungeKutta4 { max_increment }, Integrator::Reference]
 }
 
-/// Least and largest mean stress over steps and integrators.
+/// Smallest and largest mean stress, kPa, over steps and integrators.
 fn range_over_steps(shear_rates: [f64; 2]) -> (f64, f64) {
     let mut range = (f64::INFINITY, 0.0_f64);
     for step in STEPS {
@@ -87,22 +87,22 @@ fn range_over_steps(shear_rates: [f64; 2]) -> (f64, f64) {
     range
 }
 
-/// While shear goes on, which origin a biaxial reversal keeps hangs on the sign of the xy component of the
-/// back-stress ratio. Here that component passes through zero at a reversal, and the step decides.
+/// The origin that is kept at a biaxial reversal depends on the sign of the xy component of the back-stress ratio. Here
+/// that component is near zero at a reversal, so its sign depends on the step.
 #[test]
 fn a_biaxial_reversal_where_shear_stress_changes_sign_does_not_converge() {
     let (low, high) = range_over_steps([0.05, 0.00784]);
     assert!(low < 45.0 && high > 75.0, "{low} to {high} kPa");
-    // A tenth faster or slower back, and every step and integrator agrees.
+    // With 10 % more or less shear strain in the second phase, all steps and integrators agree.
     for back in [0.007, 0.0086] {
         let (low, high) = range_over_steps([0.05, back]);
         assert!(high - low < 0.5, "{low} to {high} kPa");
     }
 }
 
-/// The same in its plainest form: shear strain too small to matter, and another answer for each of its rates.
+/// The same in its simplest form: shear strain is negligible, but the result differs for each of its rates.
 #[test]
-fn a_vanishing_shear_strain_changes_the_answer_of_biaxial_cycles() {
+fn a_negligible_shear_strain_changes_the_result_of_biaxial_cycles() {
     let integrator = Integrator::default();
     let step = Integrator::DEFAULT_INCREMENT;
     let p = |forward: f64, back: f64| biaxial_cycles_with_shear([forward, back], &integrator, step);

@@ -1,4 +1,4 @@
-//! The page that tells how to write a model quotes the code as it is.
+//! The page on writing a model quotes the present code.
 
 #![allow(clippy::unwrap_used, reason = "a failure here is a failure of the test")]
 
@@ -10,12 +10,12 @@ fn read(file: &str) -> String {
     std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(file)).unwrap()
 }
 
-/// Lines without indentation, for a quotation has less of it.
+/// Lines without indentation, because a quotation is indented less.
 fn lines(text: &str) -> Vec<&str> {
     text.lines().map(str::trim).collect()
 }
 
-/// Fenced blocks of a page that name a file, with its name.
+/// Fenced blocks of a page that name a file: the file name and the lines.
 fn quotations(page: &str) -> Vec<(&str, Vec<&str>)> {
     let mut quotations = Vec::new();
     let mut lines = page.lines();
@@ -30,20 +30,20 @@ fn quotations(page: &str) -> Vec<(&str, Vec<&str>)> {
 }
 
 #[test]
-fn every_block_stands_in_its_file() {
+fn every_block_is_found_in_its_file() {
     let page = read(PAGE);
     let quotations = quotations(&page);
     assert!(quotations.len() > 10, "{} blocks", quotations.len());
     for (file, block) in quotations {
         let text = read(file);
         let found = lines(&text).windows(block.len()).any(|part| part == block);
-        assert!(found, "{file} does not hold:\n{}", block.join("\n"));
+        assert!(found, "not found in {file}:\n{}", block.join("\n"));
     }
 }
 
-/// The model of the page is quoted whole, but for its tests.
+/// The page quotes the whole model except its tests.
 #[test]
-fn the_page_holds_the_whole_model() {
+fn the_page_contains_the_whole_model() {
     let file = "crates/sandboil-soil/src/pressure_elastic.rs";
     let (page, text) = (read(PAGE), read(file));
     let sorted = |mut lines: Vec<String>| {

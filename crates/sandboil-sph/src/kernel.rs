@@ -15,23 +15,23 @@ impl WendlandQuintic {
     /// Support radius over smoothing length.
     pub const SUPPORT_RATIO: f64 = 2.0;
 
-    /// A kernel of smoothing length `h` in metres; `h` must be positive and finite.
+    /// A kernel of smoothing length `h`, m, which must be positive and finite.
     pub fn new(smoothing_length: f64) -> Self {
         debug_assert!(smoothing_length > 0.0 && smoothing_length.is_finite());
         Self { smoothing_length, normalisation: 7.0 / (4.0 * PI * smoothing_length * smoothing_length) }
     }
 
-    /// Smoothing length `h` in metres.
+    /// Smoothing length `h`, m.
     pub fn smoothing_length(&self) -> f64 {
         self.smoothing_length
     }
 
-    /// Support radius `2 h` in metres.
+    /// Support radius `2 h`, m.
     pub fn support(&self) -> f64 {
         Self::SUPPORT_RATIO * self.smoothing_length
     }
 
-    /// `W(r)` in 1/m2.
+    /// `W(r)`, 1/m2, at a distance in m.
     pub fn value(&self, distance: f64) -> f64 {
         let q = distance / self.smoothing_length;
         if q >= Self::SUPPORT_RATIO {
@@ -42,7 +42,7 @@ impl WendlandQuintic {
         self.normalisation * t2 * t2 * (1.0 + 2.0 * q)
     }
 
-    /// Gradient with respect to the *own* position `x_i`, given `x_ji = x_j - x_i`, in 1/m3.
+    /// Gradient of `W` with respect to `x_i`, 1/m3, for `x_ji = x_j - x_i`, m.
     pub fn gradient(&self, x_ji: Vec2) -> Vec2 {
         let q = x_ji.norm() / self.smoothing_length;
         if q >= Self::SUPPORT_RATIO {
@@ -80,7 +80,7 @@ mod tests {
             let kernel = WendlandQuintic::new(h);
             let x_ji = Vec2::new(qx * h, qy * h);
             let step = 1e-6 * h;
-            // x_ji falls when x_i moves forward.
+            // A positive change of x_i is a negative change of x_ji.
             let slope = |e: Vec2| (kernel.value((x_ji - e).norm()) - kernel.value((x_ji + e).norm())) / (2.0 * step);
             let numeric = Vec2::new(slope(Vec2::new(step, 0.0)), slope(Vec2::new(0.0, step)));
             let scale = kernel.value(0.0) / h;

@@ -1,7 +1,7 @@
-//! Neighbour search by a counting sort into cells; compressed lists with a skin.
+//! Neighbour search with a counting sort into cells; compressed neighbour lists with a skin.
 //!
-//! Mirror images (walls) are sources like any other; lateral periods are explicit: a pair is listed once for
-//! each image inside the radius, so a domain narrower than the support, even one particle wide, is exact.
+//! Mirror images (at walls) are ordinary sources. In a domain with a lateral period, a pair is listed once for each
+//! periodic image inside the radius. A domain narrower than the support, even one particle wide, is therefore exact.
 
 use crate::{Vec2, sparse::index};
 
@@ -12,7 +12,7 @@ pub struct Period {
     pub width: f64,
 }
 
-/// A node that can be a neighbour: a real one, or the mirror image of one in a wall.
+/// A node that can be a neighbour: a real node, or its mirror image in a wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Source {
     /// Index of the real node.
@@ -39,13 +39,13 @@ pub struct NeighbourList {
     pairs: Vec<Neighbour>,
 }
 
-/// Upper bound of the number of cells for each source: a lost particle must not blow the memory up.
+/// Largest number of cells per source, so that one particle far away does not exhaust the memory.
 const CELLS_PER_SOURCE: usize = 4;
-/// Cells that any list may use, however few its sources.
+/// Number of cells that is always allowed, also with few sources.
 const MINIMUM_CELL_BUDGET: usize = 64;
 
 impl NeighbourList {
-    /// Lists, for each query, every source with distance `<= radius + skin` (ties count as inside).
+    /// Lists, for each query point, every source at a distance `<= radius + skin`, m.
     ///
     /// Pairs of a query are ordered by source, then by wrap. Positions must be finite.
     pub fn build(
@@ -70,7 +70,7 @@ impl NeighbourList {
                 }
             });
             pairs[first..].sort_unstable_by_key(|pair| (pair.source, pair.wraps));
-            // A cell can be met twice from both sides of a narrow period.
+            // With a narrow period, a cell may be visited from both sides.
             let mut kept = first;
             for k in first..pairs.len() {
                 if k == first || pairs[k] != pairs[kept - 1] {
@@ -101,7 +101,7 @@ impl NeighbourList {
 }
 
 impl Neighbour {
-    /// `x_ji = x_j - x_i` with the source's image taken into account, m.
+    /// `x_ji = x_j - x_i` to the periodic image of the source, m.
     pub fn offset(&self, query: Vec2, sources: &[Source], period: Option<Period>) -> Vec2 {
         let mut offset = sources[self.source as usize].position - query;
         if let Some(period) = period {
@@ -127,7 +127,7 @@ fn wraps_within(delta: Vec2, reach: f64, period: Option<Period>) -> Option<std::
 }
 
 /// A float that is already whole, as an integer.
-#[allow(clippy::cast_possible_truncation)] // a handful of wraps or cells, bounded by the callers
+#[allow(clippy::cast_possible_truncation)] // a small number of wraps or cells, bounded by the callers
 fn whole(value: f64) -> i32 {
     value as i32
 }
@@ -140,14 +140,15 @@ struct Cells {
     rows: usize,
     period: Option<Period>,
     start: Vec<u32>,
-    /// Source and the wraps already spent on bringing it into the first period.
+    /// Source, and the number of wraps that moves it into the first period.
     member: Vec<(u32, i32)>,
+    /// Position of each member in the first period, m.
     wrapped: Vec<Vec2>,
 }
 
 impl Cells {
     fn build(sources: &[Source], reach: f64, period: Option<Period>) -> Self {
-        let bring_home = |position: Vec2| match period {
+        let into_first_period = |position: Vec2| match period {
             None => (position, 0),
             Some(Period { width }) => {
                 let wraps = -whole((position.x / width).floor());
@@ -156,8 +157,8 @@ impl Cells {
         };
         let mut low = Vec2::repeat(f64::INFINITY);
         let mut high = Vec2::repeat(f64::NEG_INFINITY);
-        let home: Vec<(Vec2, i32)> = sources.iter().map(|s| bring_home(s.position)).collect();
-        for (position, _) in &home {
+        let wrapped: Vec<(Vec2, i32)> = sources.iter().map(|s| into_first_period(s.position)).collect();
+        for (position, _) in &wrapped {
             low = low.inf(position);
             high = high.sup(position);
         }
@@ -182,7 +183,7 @@ impl Cells {
             member: vec![(0, 0); sources.len()],
             wrapped: vec![Vec2::zeros(); sources.len()],
         };
-        let cell_of: Vec<usize> = home.iter().map(|(position, _)| cells.cell(*position)).collect();
+        let cell_of: Vec<usize> = wrapped.iter().map(|(position, _)| cells.cell(*position)).collect();
         for &cell in &cell_of {
             cells.start[cell + 1] += 1;
         }
@@ -190,7 +191,7 @@ impl Cells {
             cells.start[cell + 1] += cells.start[cell];
         }
         let mut next = cells.start.clone();
-        for (source, (&cell, &(position, wraps))) in cell_of.iter().zip(&home).enumerate() {
+        for (source, (&cell, &(position, wraps))) in cell_of.iter().zip(&wrapped).enumerate() {
             let slot = next[cell] as usize;
             cells.member[slot] = (index(source), wraps);
             cells.wrapped[slot] = position;
@@ -223,7 +224,7 @@ impl Cells {
             };
             match self.period {
                 None => columns(query.x - reach - self.origin.x, query.x + reach - self.origin.x),
-                // A period no wider than the search window: every column is in reach.
+                // The period is not wider than the search window, so every column is within reach.
                 Some(Period { width }) if width <= 2.0 * reach => {
                     columns(0.0, self.size * self.columns as f64);
                 }
@@ -238,7 +239,7 @@ impl Cells {
     }
 }
 
-/// Cells needed for an extent of `cells` cell sizes.
+/// Number of cells needed for an extent of `cells` cell sizes.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // non-negative and below the cell budget
 fn count(cells: f64) -> usize {
     cells.floor() as usize + 1
@@ -302,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn ties_on_the_radius_count_as_inside() {
+    fn a_source_exactly_at_the_radius_is_listed() {
         let sources = sources(&[(0.0, 0.0), (1.0, 0.0), (0.0, 2.0)]);
         let list = NeighbourList::build(&[Vec2::zeros()], &sources, 1.0, 0.0, None);
         assert_eq!(list.of(0).len(), 2);
@@ -320,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn a_column_one_particle_wide_meets_all_its_images() {
+    fn a_column_one_particle_wide_lists_all_its_images() {
         let sources = sources(&[(0.1, 0.0)]);
         let list =
             NeighbourList::build(&[Vec2::new(0.1, 0.0)], &sources, 0.56, 0.0, Some(Period { width: 0.2 }));

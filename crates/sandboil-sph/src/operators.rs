@@ -1,5 +1,5 @@
-//! Particle operators as weights: each function takes the stencil of one point and returns what multiplies
-//! the values of its members. Nothing here knows which field the weights will meet.
+//! Particle operators as weights: each function takes the stencil of one point and returns the factors on the values of
+//! its members. The weights apply to any field.
 //!
 //! Equation numbers are those of Mhaski & Ramana (2025), CMES 142(1).
 
@@ -10,11 +10,11 @@ use crate::{
 use nalgebra::Matrix3;
 use std::ops::AddAssign;
 
-/// Why a point has no operator.
+/// Error for a stencil from which no operator can be formed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OperatorError {
-    /// Too few neighbours, or all of them on one line: no gradient can be formed.
+    /// No gradient can be formed: too few neighbours, or all of them on one line.
     #[error("fewer than four neighbours or all on one line")]
     Degenerate,
 }
@@ -22,7 +22,7 @@ pub enum OperatorError {
 /// A member of a point's stencil.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Member {
-    /// Index of the real node whose value counts.
+    /// Index of the real node whose value is used.
     pub owner: u32,
     /// Index of the source: the node itself or one of its images.
     pub source: u32,
@@ -34,7 +34,7 @@ pub struct Member {
     pub volume: f64,
 }
 
-/// All members of one query's stencil inside the kernel's support.
+/// All members of the stencil of one query point, inside the support of the kernel.
 pub fn stencil(
     list: &NeighbourList,
     query: usize,
@@ -65,7 +65,7 @@ pub fn stencil(
 pub struct GradientWeight {
     /// `g_sj`, 1/m: `grad f = sum f_j g_sj`.
     pub gradient: Vec2,
-    /// `w_sj / sum w`: share in the weighted mean, used by the velocity filter.
+    /// `w_sj / sum w`: share in the weighted mean (for the velocity filter).
     pub share: f64,
 }
 
@@ -76,7 +76,7 @@ impl AddAssign for GradientWeight {
     }
 }
 
-/// Kernel-weighted linear least squares over a stencil: exact for linear fields at any boundary.
+/// Kernel-weighted linear least-squares fit over a stencil. It is exact for linear fields, also at boundaries.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeastSquaresFit {
     mean: Vec2,
@@ -86,10 +86,10 @@ pub struct LeastSquaresFit {
 }
 
 impl LeastSquaresFit {
-    /// Smallest determinant of the position covariance, in units of `h^4`, that still counts as a plane
-    /// neighbourhood (0.077 inside a lattice, 0.009 in its corner, 0 on a line).
+    /// Smallest determinant of the position covariance, in units of `h^4`, for a fit (0.077 inside a lattice, 0.009 in
+    /// its corner, 0 on a line).
     const LEAST_DETERMINANT: f64 = 0.004;
-    /// Fewest members of a fit: three determine it, the fourth says whether it can be trusted.
+    /// Smallest number of members of a fit: three determine it, the fourth makes it more reliable.
     const FEWEST_MEMBERS: usize = 4;
 
     /// Fits the stencil.
@@ -145,7 +145,7 @@ impl LeastSquaresFit {
 pub fn corrected_gradient(members: &[Member], kernel: WendlandQuintic) -> Result<Vec<Vec2>, OperatorError> {
     let gradients: Vec<Vec2> = members.iter().map(|m| kernel.gradient(m.offset) * m.volume).collect();
     let moment: Mat2 = members.iter().zip(&gradients).map(|(m, g)| g * m.offset.transpose()).sum();
-    // Inside a filled domain the moment matrix is near the identity; a lone pair leaves it singular.
+    // Inside a filled domain the moment matrix is near the identity; for one pair it is singular.
     if !(moment.determinant().abs() > LEAST_MOMENT_DETERMINANT) {
         return Err(OperatorError::Degenerate);
     }
@@ -156,7 +156,8 @@ pub fn corrected_gradient(members: &[Member], kernel: WendlandQuintic) -> Result
 /// Smallest determinant of the kernel moment matrix (1 inside, 0.25 in a lattice corner, 0 on a line).
 const LEAST_MOMENT_DETERMINANT: f64 = 0.01;
 
-/// `V_j x_ji . L_i grad_i W_ij / |x_ji|^2` for every member: `V_j F~_ij` of Eq. 7, zero for the point itself.
+/// `V_j x_ji . L_i grad_i W_ij / |x_ji|^2` for every member: `V_j F~_ij` of Eq. 7; zero for the point itself.
+/// `corrected` is the result of [`corrected_gradient`].
 pub fn laplacian_factor(members: &[Member], corrected: &[Vec2]) -> Vec<f64> {
     members
         .iter()
@@ -168,7 +169,7 @@ pub fn laplacian_factor(members: &[Member], corrected: &[Vec2]) -> Vec<f64> {
         .collect()
 }
 
-/// First-order consistent fit of Eq. 9: per member the weights of value and gradient.
+/// First-order consistent fit of Eq. 9: for each member its weight in the value and in the gradient (1/m).
 ///
 /// # Errors
 /// [`OperatorError::Degenerate`] where the moment matrix cannot be inverted.
@@ -177,7 +178,7 @@ pub fn consistent_fit(
     kernel: WendlandQuintic,
 ) -> Result<Vec<(f64, Vec2)>, OperatorError> {
     let h = kernel.smoothing_length();
-    // Rows and columns are scaled by h so that the matrix is dimensionless.
+    // Rows and columns are scaled with h to make the matrix dimensionless.
     let test = |m: &Member| {
         let gradient = kernel.gradient(m.offset) * h;
         nalgebra::Vector3::new(kernel.value(m.offset.norm()), gradient.x, gradient.y) * m.volume
@@ -201,7 +202,7 @@ pub fn consistent_fit(
         .collect())
 }
 
-/// Shepard interpolation of Eq. 10: the weight of every member, summing to one.
+/// Shepard interpolation of Eq. 10: the weight of every member; their sum is one.
 ///
 /// # Errors
 /// [`OperatorError::Degenerate`] without any member.
@@ -219,7 +220,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A lattice with disorder, seen from a point of it; `cut` removes one side to make a surface or corner.
+    /// A disordered lattice as the stencil of one of its points; `cut` removes one side to make a surface or a corner.
     fn cloud(disorder: &[(f64, f64)], cut: Vec2) -> Vec<Member> {
         let mut members = Vec::new();
         for (k, &(a, b)) in disorder.iter().enumerate() {

@@ -1,8 +1,8 @@
-//! Compressed sparse rows: the one container of every particle operator.
+//! Compressed sparse rows, the container of all particle operators.
 
 use std::{collections::BTreeMap, ops::AddAssign};
 
-/// A sparse table in compressed-row form. Columns rise within a row and occur once.
+/// A sparse table in compressed-row form. Within a row, columns are in ascending order and unique.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Csr<T> {
     start: Vec<u32>,
@@ -17,15 +17,15 @@ impl<T> Default for Csr<T> {
 }
 
 impl<T: Copy + AddAssign> Csr<T> {
-    /// An empty table with room for `rows` rows.
+    /// An empty table with reserved memory for `rows` rows and `entries` entries.
     pub fn with_capacity(rows: usize, entries: usize) -> Self {
         let mut start = Vec::with_capacity(rows + 1);
         start.push(0);
         Self { start, column: Vec::with_capacity(entries), value: Vec::with_capacity(entries) }
     }
 
-    /// Appends a row. Entries of equal column are added together in the order given, which is how images
-    /// fold into the node they mirror. `entries` is left sorted by column.
+    /// Appends a row. Entries with equal column are added in the given order; in this way the weights of images are
+    /// added to those of the real node. `entries` is sorted by column.
     pub fn push_row(&mut self, entries: &mut [(u32, T)]) {
         // A stable sort keeps the order of equal columns, so the sums are the same on every run.
         entries.sort_by_key(|&(column, _)| column);
@@ -44,7 +44,7 @@ impl<T: Copy + AddAssign> Csr<T> {
         self.start.push(index(self.column.len()));
     }
 
-    /// The table with more entries in some of its rows.
+    /// The table with additional entries, given by row. Entries with equal column are added.
     #[must_use]
     pub fn with_more(&self, mut more: BTreeMap<usize, Vec<(u32, T)>>) -> Self {
         let mut table = Self::with_capacity(self.rows(), self.entries());
@@ -57,7 +57,7 @@ impl<T: Copy + AddAssign> Csr<T> {
         table
     }
 
-    /// The table with rows and columns exchanged; rows of the result hold their columns in rising order.
+    /// The transposed table; `columns` is the number of columns of this table.
     #[must_use]
     pub fn transposed(&self, columns: usize) -> Self {
         let mut start = vec![0_u32; columns + 1];
@@ -105,10 +105,10 @@ impl<T: Copy + std::ops::MulAssign<f64>> Csr<T> {
 }
 
 impl<T: Copy> Csr<T> {
-    /// Replaces every entry by its image.
-    pub fn map_values(&mut self, image: impl Fn(T) -> T) {
+    /// Applies a function to every entry.
+    pub fn map_values(&mut self, function: impl Fn(T) -> T) {
         for value in &mut self.value {
-            *value = image(*value);
+            *value = function(*value);
         }
     }
 }
@@ -124,7 +124,7 @@ impl<T> Csr<T> {
         self.column.len()
     }
 
-    /// Bytes held by the table.
+    /// Memory used by the table, bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(self.start.as_slice())
             + size_of_val(self.column.as_slice())
@@ -150,11 +150,11 @@ impl<T> Csr<T> {
     }
 }
 
-/// Table indices are 32 bit to halve their traffic; a section never holds four thousand million pairs.
+/// A table index. Indices have 32 bits to halve the memory traffic.
 ///
 /// # Panics
-/// Never below 2^32 entries: memory ends long before.
-#[allow(clippy::expect_used)] // the bound is a property of the machine, not of the input
+/// For 2^32 entries or more, which do not fit into memory.
+#[allow(clippy::expect_used)] // limited by the machine, not by the input
 pub(crate) fn index(position: usize) -> u32 {
     u32::try_from(position).expect("fewer than 2^32 entries")
 }
@@ -165,7 +165,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn equal_columns_of_a_row_are_added_and_rows_stay_apart() {
+    fn equal_columns_are_added_within_a_row_only() {
         let mut table = Csr::with_capacity(2, 4);
         table.push_row(&mut [(3, 1.0), (1, 2.0), (3, 4.0)]);
         table.push_row(&mut [(3, 8.0)]);

@@ -1,15 +1,15 @@
-//! What a bench's time is compared with, so that figures of different machines can be: one exponential, one power
-//! and one square root.
+//! The yardstick: one exponential, one power and one square root. Times in units of it can be compared between
+//! machines.
 
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Yardsticks per timing: some 40 ms, as long as what is timed, so that a busy machine slows both alike.
+/// Yardsticks per timing, about 40 ms: as long as the timed work, so that other load slows both equally.
 const YARDSTICKS: u32 = 2_000_000;
-/// Timings of which the fastest counts: others on the machine only slow it down.
+/// Number of timings. The fastest is used, because other load on the machine can only slow a timing.
 const REPETITIONS: usize = 9;
 
-/// One exponential, one power, one square root, each of numbers the compiler cannot foresee.
+/// Computes [`YARDSTICKS`] yardsticks. `black_box` prevents evaluation by the compiler.
 fn yardsticks() -> f64 {
     let mut sum = 0.0;
     for i in 0..YARDSTICKS {
@@ -25,7 +25,7 @@ fn seconds<T>(work: impl FnOnce() -> T) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
-/// Seconds of one of `count` pieces of `work`, and the same in yardsticks timed in turn with it.
+/// Time of one of `count` pieces of `work`: in seconds, and in units of the yardstick, timed alternately with it.
 pub fn compared<T>(count: f64, mut work: impl FnMut() -> T) -> (f64, f64) {
     let (mut piece, mut yardstick) = (f64::INFINITY, f64::INFINITY);
     for _ in 0..REPETITIONS {

@@ -1,31 +1,31 @@
-//! One increment under mixed control: some strain components prescribed, the stress of the others.
+//! One increment under mixed control: each component has either its strain or its stress prescribed.
 
 use super::Specimen;
 use crate::{Moduli, SoilError, StrainIncrement, Stress};
 use nalgebra::{Matrix3, Vector3};
 
-/// Quasi-Newton corrections before an increment is given up: three unknowns need a dozen where soil yields.
+/// Largest number of quasi-Newton corrections. Three unknowns need about a dozen where the soil yields.
 const CORRECTIONS: usize = 60;
-/// Allowed difference from a prescribed stress over the larger of the stress and [`LEAST_STRESS`].
+/// Allowed difference from a prescribed stress, relative to the larger of the stress and [`LEAST_STRESS`].
 const STRESS_TOLERANCE: f64 = 1e-7;
 /// Stress below which the tolerance is absolute, kPa.
 const LEAST_STRESS: f64 = 1.0;
-/// A correction may change strain by at most this multiple of the increment's elastic strain: more than soil yields
-/// before it flows, and little enough that a secant extrapolated across a reversal does not fly off.
+/// Largest strain change of one correction, relative to the elastic strain of the increment. It exceeds the plastic
+/// strain of soil that still resists, and keeps a secant extrapolated across a reversal from diverging.
 const TRUST: f64 = 1e3;
 
-/// Which components of `(xx, yy, xy)` have their stress prescribed, and to what, kPa, tension positive.
+/// Which components of `(xx, yy, xy)` have their stress prescribed, and the prescribed values, kPa, tension positive.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prescribed {
     pub by_stress: [bool; 3],
     pub stress: [f64; 3],
 }
 
-/// What is known of the soil's compliance from one increment to the next.
+/// Estimate of the soil's compliance, 1/kPa, kept from one increment to the next.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Compliance(Matrix3<f64>);
 
-/// Outcome of an increment that could not be made; the specimen is where it was.
+/// Reason of a failed increment; the specimen is unchanged.
 pub(super) enum Failure {
     /// The prescribed stress was not met.
     NotMet,
@@ -33,12 +33,13 @@ pub(super) enum Failure {
     Refused(SoilError),
 }
 
+/// Components `(xx, yy, xy)`, kPa.
 pub(super) fn components(stress: &Stress) -> [f64; 3] {
     [stress.xx, stress.yy, stress.xy]
 }
 
 impl Compliance {
-    /// Elastic compliance of the components under stress control, the others held.
+    /// Elastic compliance of the components under stress control, with the strain of the others fixed.
     pub(super) fn elastic(moduli: Moduli, by_stress: [bool; 3]) -> Self {
         let Moduli { bulk, shear } = moduli;
         let (direct, cross) = (bulk + 4.0 / 3.0 * shear, bulk - 2.0 / 3.0 * shear);
@@ -57,7 +58,7 @@ impl Compliance {
 }
 
 impl Specimen {
-    /// Largest distance from the prescribed stress, in units of what is tolerated.
+    /// Difference from the prescribed stress, kPa, and its largest component in units of the tolerance.
     fn misfit(&self, prescribed: &Prescribed) -> (Vector3<f64>, f64) {
         let stress = components(&self.point.stress());
         let scale = stress.iter().fold(LEAST_STRESS, |scale, s| scale.max(s.abs()));
@@ -70,6 +71,7 @@ impl Specimen {
         (residual, residual.amax() / (STRESS_TOLERANCE * scale))
     }
 
+    /// Restores the marked state and applies a strain increment to it.
     fn trial(&mut self, strain: Vector3<f64>) -> Result<(), SoilError> {
         self.point.back();
         let de = StrainIncrement { xx: strain.x, yy: strain.y, xy: strain.z, spin: 0.0 };
@@ -78,8 +80,8 @@ impl Specimen {
         Ok(())
     }
 
-    /// Makes one increment. `strain` holds the prescribed components and a first guess for the others; returns the
-    /// strain made. On failure the specimen is unchanged.
+    /// Makes one increment and returns its strain. `strain` holds the prescribed components and a first estimate of
+    /// the others. On failure the specimen is unchanged.
     pub(super) fn increment(
         &mut self,
         strain: [f64; 3],
@@ -131,11 +133,11 @@ impl Specimen {
             self.trial(strain).map_err(Failure::Refused)?;
             let (next, next_size) = self.misfit(prescribed);
             let change = next - residual;
-            let seen = *inverse * change;
-            let slope = step.dot(&seen);
+            let expected = *inverse * change;
+            let slope = step.dot(&expected);
             if slope.abs() > f64::EPSILON * step.norm_squared() {
                 let row = step.transpose() * *inverse;
-                *inverse += (step - seen) * row / slope;
+                *inverse += (step - expected) * row / slope;
             }
             (residual, size) = (next, next_size);
         }

@@ -1,8 +1,8 @@
-//! The laboratory: one material point under test, with any mixture of prescribed strain and stress.
+//! The laboratory: tests on one material point, with any combination of prescribed strain and stress.
 //!
-//! A [`Specimen`] is the very model and state that a solver would have at a stress node; it is sheared to turning
-//! points ([`Specimen::shear`]) or led along a path ([`Specimen::path`]). Strain is tension positive with
-//! engineering shear, stress effective, kPa, tension positive.
+//! A [`Specimen`] holds the same model and state as a stress node of the solver. It is sheared between turning points
+//! ([`Specimen::shear`]) or follows a given path ([`Specimen::path`]). Strain is tension positive with engineering
+//! shear; stress is effective, kPa, tension positive.
 
 mod control;
 mod path;
@@ -18,18 +18,18 @@ pub use shear::{Shear, Turn, Turns};
 use crate::{Integrator, SoilError, SoilModel, Stress, UpdateReport};
 use point::ModelPoint;
 
-/// Why a test ended. Whatever was measured up to then is in the record.
+/// Why a test ended. The record holds all results up to the end.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ending {
-    /// All that was asked for was done.
+    /// The whole test was carried out.
     Complete,
-    /// Shear strain left the range allowed to it.
+    /// Shear strain passed its limit.
     StrainLimit,
-    /// No strain was found that gives the prescribed stress: the soil cannot carry it, or flows under it.
+    /// No strain gives the prescribed stress: the soil cannot carry it, or fails under it.
     StressNotCarried {
-        /// The stress asked for, kPa, tension positive; components under strain control as they are.
+        /// The prescribed stress, kPa, tension positive; components under strain control as in `reached`.
         wanted: Stress,
-        /// The stress reached.
+        /// The stress reached, kPa, tension positive.
         reached: Stress,
     },
     /// The model refused an increment.
@@ -38,10 +38,10 @@ pub enum Ending {
     Interrupted,
 }
 
-/// Increments between looks at whether the caller wants to stop.
-const INCREMENTS_PER_LOOK: u32 = 1024;
+/// Number of increments between two calls of the caller's `stop`.
+const INCREMENTS_PER_CHECK: u32 = 1024;
 
-/// Asks the caller now and then whether to stop, however short the legs of a test are.
+/// Calls `stop` at regular intervals. Increments are counted over all legs, so short legs do not delay the call.
 struct Watch<'a> {
     stop: &'a mut dyn FnMut() -> bool,
     increments: u32,
@@ -52,10 +52,10 @@ impl<'a> Watch<'a> {
         Self { stop, increments: 0 }
     }
 
-    /// Counts an increment; true where the caller wants to stop.
+    /// Counts an increment; true if the caller wants to stop.
     fn interrupts(&mut self) -> bool {
         self.increments = self.increments.wrapping_add(1);
-        self.increments.is_multiple_of(INCREMENTS_PER_LOOK) && (self.stop)()
+        self.increments.is_multiple_of(INCREMENTS_PER_CHECK) && (self.stop)()
     }
 }
 
@@ -68,7 +68,7 @@ pub struct Specimen {
 }
 
 impl Specimen {
-    /// A specimen of a model at rest under a stress, at zero strain.
+    /// A specimen of a model at rest under a stress (kPa, tension positive), at zero strain.
     ///
     /// # Errors
     /// As [`SoilModel::initialise`].
@@ -82,7 +82,7 @@ impl Specimen {
         Ok(Self::of_point(Box::new(ModelPoint::new(model.clone(), state)), integrator))
     }
 
-    /// A specimen of a point that is already there.
+    /// A specimen made of an existing point.
     pub fn of_point(point: Box<dyn Point>, integrator: Integrator) -> Self {
         Self { point, integrator, strain: [0.0; 3], report: UpdateReport::default() }
     }
@@ -102,17 +102,17 @@ impl Specimen {
         &*self.point
     }
 
-    /// What the model counted in accepted increments and in trials that were given up.
+    /// Counters of the model, over accepted increments and rejected trials.
     pub fn report(&self) -> UpdateReport {
         self.report
     }
 
-    /// Switches the model to reconsolidation after shaking; returns whether that makes any difference to it.
+    /// Switches the model to reconsolidation after shaking; false if the model has no such state.
     pub fn reconsolidate(&mut self) -> bool {
         self.point.reconsolidate()
     }
 
-    /// Another specimen in the same state, to go on with while this one stays.
+    /// An independent specimen in the same state.
     #[must_use]
     pub fn copy(&self) -> Self {
         Self { point: self.point.copy(), ..*self }

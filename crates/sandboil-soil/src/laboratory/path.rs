@@ -1,4 +1,4 @@
-//! A path given row by row.
+//! A test along a path that is given row by row.
 
 use super::{
     Ending, Record, Specimen, Watch,
@@ -9,22 +9,22 @@ use crate::{
     error::{finite, positive},
 };
 
-/// Smallest share of the usual part of a leg that is still tried where the stress is not met.
+/// Smallest part of a leg that is tried where the prescribed stress is not met, relative to the usual part.
 const SMALLEST_PART: f64 = 1e-6;
 
-/// A path through prescribed strains and stresses, straight between rows.
+/// A path of prescribed strains and stresses, linear between rows.
 #[derive(Debug, Clone)]
 pub struct Path {
-    /// Which components of `(xx, yy, xy)` are prescribed by stress; the others by strain.
+    /// Which components of `(xx, yy, xy)` are prescribed by stress; the others are prescribed by strain.
     pub by_stress: [bool; 3],
     /// Values at the end of each leg: total strain since the specimen was made, or stress in kPa; tension positive.
     pub rows: Vec<[f64; 3]>,
-    /// Largest component of a strain increment, and of the elastic strain of a stress increment.
+    /// Largest component of a strain increment, or of the elastic strain of a stress increment.
     pub strain_step: f64,
 }
 
 impl Path {
-    /// Refuses what would never end, or mean nothing.
+    /// Refuses a step that is not positive and values that are not finite.
     fn check(&self) -> Result<(), SoilError> {
         positive("strain_step", self.strain_step)?;
         self.rows.iter().flatten().try_for_each(|value| finite("path", *value).map(|_| ()))
@@ -32,7 +32,8 @@ impl Path {
 }
 
 impl Specimen {
-    /// Leads the specimen along a path. The record gets its present state if it is empty, and one line for each row.
+    /// Takes the specimen along a path. An empty record first receives the present state; every row adds one line.
+    /// Calls `stop` at regular intervals; true ends the test.
     pub fn path(&mut self, path: &Path, record: &mut Record, stop: &mut dyn FnMut() -> bool) -> Ending {
         if let Err(error) = path.check() {
             return Ending::Refused(error);
@@ -77,7 +78,7 @@ impl Specimen {
             if watch.interrupts() {
                 return Ending::Interrupted;
             }
-            // The last part ends at the target itself, whatever round-off the others left.
+            // The last part ends exactly at the target, so round-off does not accumulate.
             let end = if done + part * (1.0 + SMALLEST_PART) >= 1.0 { 1.0 } else { done + part };
             let mut strain = [0.0; 3];
             let mut stress = [0.0; 3];

@@ -1,14 +1,14 @@
-//! A model with its state, whichever model it is: the laboratory drives every one through the same table of calls.
+//! A model together with its state, behind one interface for all models.
 
 use crate::{Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport};
 
-/// A soil at one point. Trials are made from a mark and taken back to it.
+/// A soil at one point. A trial starts from the marked state and can be undone by restoring that state.
 pub trait Point: Send + Sync {
-    /// Remembers the present state as the one that [`Point::back`] returns to.
+    /// Stores the present state for [`Point::back`].
     fn mark(&mut self);
-    /// Returns to the marked state.
+    /// Restores the marked state.
     fn back(&mut self);
-    /// Moves through a strain increment.
+    /// Applies a strain increment.
     ///
     /// # Errors
     /// As [`SoilModel::update`].
@@ -17,17 +17,17 @@ pub trait Point: Send + Sync {
     fn stress(&self) -> Stress;
     /// Present elastic moduli, kPa.
     fn moduli(&self) -> Moduli;
-    /// Void ratio, if the model knows it.
+    /// Void ratio; `None` if the model has none.
     fn void_ratio(&self) -> Option<f64>;
-    /// Accumulated plastic shear strain, if the model keeps it.
+    /// Accumulated plastic shear strain (engineering); `None` if the model has none.
     fn plastic_shear_strain(&self) -> Option<f64>;
-    /// Switches to reconsolidation after shaking; returns whether the model makes a difference.
+    /// Switches to reconsolidation after shaking; false if the model has no such state.
     fn reconsolidate(&mut self) -> bool;
-    /// Another point in the same state.
+    /// An independent point in the same state.
     fn copy(&self) -> Box<dyn Point>;
 }
 
-/// A [`SoilModel`] with a state of it.
+/// A [`SoilModel`] with its present and its marked state.
 #[derive(Clone)]
 pub(super) struct ModelPoint<M: SoilModel> {
     model: M,

@@ -1,49 +1,50 @@
-//! What a test writes down.
+//! The record of a test.
 
 use crate::Stress;
 
 /// One line of a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
-    /// Strain `xx, yy`, engineering `xy`, tension positive.
+    /// Strain `xx`, `yy` and engineering `xy` since the specimen was made, tension positive.
     pub strain: [f64; 3],
     /// Effective stress, kPa, tension positive.
     pub stress: Stress,
-    /// Void ratio, if the model knows it.
+    /// Void ratio; `None` if the model has none.
     pub void_ratio: Option<f64>,
-    /// Cycles so far: 0.25 at the first turn, half a cycle from turn to turn, between turns in proportion to the
-    /// quantity that is turned.
+    /// Number of cycles so far: 0.25 at the first turn, 0.5 more at each further turn, linear in the cycled quantity
+    /// between turns.
     pub cycle: f64,
-    /// Turns (or legs of a path) completed so far, that at this row included.
+    /// Number of turns (or of legs of a path) completed so far, including one at this row.
     pub turns: usize,
 }
 
-/// Cycles so far after `turns` turns, where the quantity that is turned has come to `value` on its way `from` the last
-/// turn `to` the next. Soil may soften on the way: cycles never go back beyond the last turn.
+/// Number of cycles so far, after `turns` turns. The cycled quantity (shear stress or strain) is now `value`, between
+/// its value `from` at the last turn and `to` at the next. Where soil softens, the value may fall behind the last turn;
+/// the number of cycles then stays at that of the last turn.
 pub fn cycles(turns: usize, (from, to): (f64, f64), value: f64) -> f64 {
     let (begun, length) = if turns == 0 { (0.0, 0.25) } else { (0.5 * turns as f64 - 0.25, 0.5) };
     let share = if to == from { 1.0 } else { ((value - from) / (to - from)).clamp(0.0, 1.0) };
     begun + share * length
 }
 
-/// Changes that are worth a line: rows closer than all of these to the last one written are left out, except turns
-/// and the end.
+/// Smallest changes to be recorded. A row is left out if stress and strain have both changed less than this since the
+/// last recorded row. Turns and the end are always recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resolution {
-    /// Change of a stress component, kPa.
+    /// Largest change of a stress component, kPa.
     pub stress: f64,
-    /// Change of a strain component.
+    /// Largest change of a strain component.
     pub strain: f64,
 }
 
 impl Resolution {
-    /// Every increment.
+    /// Records every increment.
     pub const EVERY: Self = Self { stress: 0.0, strain: 0.0 };
-    /// Turns and ends only.
+    /// Records turns and ends only.
     pub const TURNS: Self = Self { stress: f64::INFINITY, strain: f64::INFINITY };
 }
 
-/// The lines of a test.
+/// The rows of a test.
 #[derive(Debug, Clone)]
 pub struct Record {
     resolution: Resolution,
@@ -56,19 +57,19 @@ impl Record {
         Self { resolution, rows: Vec::new() }
     }
 
-    /// The lines.
+    /// The recorded rows, in order.
     pub fn rows(&self) -> &[Row] {
         &self.rows
     }
 
-    /// Writes a line whatever its distance, once.
+    /// Records a row regardless of its distance from the last one; a repetition of the last row is left out.
     pub fn keep(&mut self, row: Row) {
         if self.rows.last() != Some(&row) {
             self.rows.push(row);
         }
     }
 
-    /// Writes a line if it is far enough from the last one.
+    /// Records a row if it is far enough from the last one.
     pub fn offer(&mut self, row: Row) {
         let Some(last) = self.rows.last() else {
             self.rows.push(row);

@@ -1,4 +1,5 @@
-//! Direct simple shear to turning points: no lateral strain, and either constant volume or a held vertical stress.
+//! Direct simple shear between turning points: no lateral strain, and either constant volume or constant vertical
+//! stress.
 
 use super::{
     Ending, Record, Specimen, Watch,
@@ -10,14 +11,14 @@ use crate::{
     error::{finite, positive},
 };
 
-/// Trials for the share of an increment that ends at a turn.
+/// Largest number of trials to end an increment exactly at a turn.
 const TURN_TRIALS: usize = 60;
-/// Allowed difference of the shear stress from its turning point, over the distance between turns.
+/// Allowed difference of the shear stress from its turning point, relative to the distance between turns.
 const TURN_TOLERANCE: f64 = 1e-9;
-/// Smallest part of the strain step that is still tried where the vertical stress is not met.
+/// Smallest increment that is tried where the vertical stress is not met, relative to the strain step.
 const SMALLEST_STEP: f64 = 1e-5;
 
-/// Where shear turns back.
+/// A turning point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Turn {
     /// At this shear stress, kPa.
@@ -34,18 +35,18 @@ impl Turn {
     }
 }
 
-/// The sequence of turns.
+/// The sequence of turning points.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Turns {
-    /// One after the other.
+    /// A list of turns, in order.
     Each(Vec<Turn>),
-    /// Two in alternation, this many in all.
+    /// Two alternating turns.
     Alternating {
-        /// First, third, fifth...
+        /// First, third, fifth turn and so on.
         odd: Turn,
-        /// Second, fourth...
+        /// Second, fourth turn and so on.
         even: Turn,
-        /// Number of turns.
+        /// Total number of turns.
         count: usize,
     },
 }
@@ -64,18 +65,18 @@ impl Turns {
 /// A direct simple shear test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shear {
-    /// Vertical effective stress held (drained), or volume held (undrained, constant volume).
+    /// True: vertical effective stress is constant (drained). False: volume is constant (undrained).
     pub drained: bool,
-    /// Where to turn.
+    /// The turning points.
     pub turns: Turns,
-    /// Shear strain of one increment.
+    /// Shear strain (engineering) of one increment.
     pub strain_step: f64,
-    /// Largest distance of the shear strain from its value at the start; beyond it the test ends.
+    /// Largest change of the shear strain from its value at the start; the test ends beyond it.
     pub strain_limit: f64,
 }
 
 impl Shear {
-    /// Refuses what would never end, or seem to end at once.
+    /// Refuses a step or limit that is not positive, and turns that are not finite.
     fn check(&self) -> Result<(), SoilError> {
         positive("strain_step", self.strain_step)?;
         if !(self.strain_limit > 0.0) {
@@ -90,16 +91,19 @@ impl Shear {
     }
 }
 
-/// One leg from turn to turn.
+/// One leg, from the last turn to the next.
 struct Leg {
     turn: Turn,
+    /// Sign of the change of the cycled quantity.
     direction: f64,
-    /// Value at the last turn of the quantity that is turned.
+    /// Value of the cycled quantity (shear stress or strain) at the last turn.
     from: f64,
+    /// Number of turns before this leg.
     turns: usize,
 }
 
 impl Leg {
+    /// Present value of the cycled quantity.
     fn value(&self, specimen: &Specimen) -> f64 {
         match self.turn {
             Turn::Stress(_) => specimen.stress().xy,
@@ -111,14 +115,15 @@ impl Leg {
         self.turn.value()
     }
 
-    /// Cycles at the present value.
+    /// Number of cycles so far, at a value of the cycled quantity.
     fn cycle(&self, value: f64) -> f64 {
         cycles(self.turns, (self.from, self.target()), value)
     }
 }
 
 impl Specimen {
-    /// Shears the specimen from turn to turn. The record gets its present state if it is empty, and every turn.
+    /// Shears the specimen through all turns. An empty record first receives the present state; every turn is recorded.
+    /// Calls `stop` at regular intervals; true ends the test.
     pub fn shear(&mut self, test: &Shear, record: &mut Record, stop: &mut dyn FnMut() -> bool) -> Ending {
         if let Err(error) = test.check() {
             return Ending::Refused(error);
@@ -202,7 +207,7 @@ impl Specimen {
         Ending::Complete
     }
 
-    /// One increment towards the turn; an increment that passes a turning stress is shortened to end at it.
+    /// One increment towards the turn. An increment that passes a turning stress is shortened to end at that stress.
     fn shear_increment(
         &mut self,
         leg: &Leg,

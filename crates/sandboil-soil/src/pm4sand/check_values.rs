@@ -1,5 +1,5 @@
-//! Constants, initial values and single evaluations against numbers of an independent program (Python, same
-//! equations; its trajectories agree with OpenSees 3.7.1). Printed figures, to the last digit.
+//! Constants, initial values and single evaluations against the printed digits of an independent program (in Python,
+//! with the same equations; its stress paths agree with OpenSees 3.7.1).
 
 use super::{
     PM4Sand, Parameters, State,
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{Deviator, Moduli, SoilModel, Stress, UpdateReport};
 
-/// `value` rounds to the printed figure; zero is meant exactly.
+/// Fails unless `value` rounds to the printed number; a printed zero must be exact.
 fn agrees(name: &str, value: f64, printed: &str) {
     let (mantissa, exponent) = printed.split_once('e').unwrap_or((printed, "0"));
     let decimals = mantissa.split_once('.').map_or(0, |(_, after)| after.len());
@@ -24,7 +24,7 @@ fn sand(dr: f64, g0: f64, hpo: f64) -> PM4Sand {
     PM4Sand::new(Parameters { dr, g0, hpo, ..Parameters::default() }, super::Options::default()).unwrap()
 }
 
-/// One atmosphere of vertical stress, half of it horizontally.
+/// State at a vertical stress of one atmosphere and half of it horizontally.
 fn start(sand: &PM4Sand) -> State {
     sand.initialise(Stress { xx: -50.65, yy: -101.3, xy: 0.0, zz: -50.65 }, None).unwrap()
 }
@@ -72,7 +72,7 @@ fn constants_and_initial_values() {
     }
 }
 
-/// A state of the middle calibration and what the rate equations say there.
+/// A state of the middle calibration and the expected values of the rate equations.
 struct Evaluation {
     /// (mean, half difference, xy), kPa, compression positive.
     stress: (f64, f64, f64),
@@ -232,9 +232,9 @@ fn evaluation_near_the_pressure_floor() {
 }
 
 /// Between the rotated and the unrotated dilatancy surface a point may dilate, but fabric grows only beyond the
-/// latter.
+/// unrotated one.
 #[test]
-fn fabric_waits_for_the_unrotated_surface() {
+fn fabric_grows_only_beyond_the_unrotated_dilatancy_surface() {
     let sand = sand(0.55, 677.0, 0.40);
     let mut state = start(&sand);
     let n = traceless(0.1, 0.7);
@@ -267,7 +267,7 @@ fn fabric_waits_for_the_unrotated_surface() {
     }
 }
 
-/// A state that has sheared forward, just before it reverses.
+/// A state after forward shear, just before a reversal.
 fn before_reversal(sand: &PM4Sand) -> State {
     let mut state = start(sand);
     state.before_first_reversal = false;
@@ -281,31 +281,31 @@ fn reversed(mut state: State, trial_direction: Deviator) -> State {
     state
 }
 
-/// `p_zp` follows the strongest fabric times pressure, and only upwards (after the first reversal).
+/// After the first reversal, `p_zp` changes only where both `|z| p` and `p` exceed their earlier largest values.
 #[test]
-fn pressure_of_the_strongest_fabric_is_renewed_at_a_reversal_where_both_have_grown() {
+fn p_zp_is_updated_at_a_reversal_where_fabric_and_pressure_have_increased() {
     let sand = sand(0.55, 677.0, 0.40);
     let back = traceless(0.0, -0.7);
     let mut state = before_reversal(&sand);
     state.fabric = traceless(0.3, 0.4);
     let zp = state.fabric.norm() * state.mean;
-    for (zp_max, p_zp, renewed) in [
+    for (zp_max, p_zp, updated) in [
         (0.9 * zp, 0.9 * state.mean, true),
         (1.1 * zp, 0.9 * state.mean, false),
         (0.9 * zp, 1.1 * state.mean, false),
     ] {
         (state.zp_max, state.p_zp) = (zp_max, p_zp);
         let after = reversed(state, back);
-        let expected = if renewed { (zp, state.mean) } else { (zp_max, p_zp) };
+        let expected = if updated { (zp, state.mean) } else { (zp_max, p_zp) };
         assert_eq!((after.zp_max, after.p_zp), expected);
         assert_eq!((after.fabric_in, after.alpha_in_true), (state.fabric, state.alpha));
     }
     let forward = reversed(state, -back);
-    assert_eq!(forward, state, "going on is no reversal");
+    assert_eq!(forward, state, "continued loading is no reversal");
 }
 
-/// A small loop keeps, component by component, the extreme that loading on leaves behind, and never one of the other
-/// sign; a loop through zero shear starts from where it turns.
+/// After a small loop the origin of each component is its minimum (loading up) or maximum (loading down), limited to
+/// the same sign. After a loop through zero shear the origin is the turning point.
 #[test]
 fn a_small_loop_keeps_the_older_origin_component_by_component() {
     let sand = sand(0.55, 677.0, 0.40);
@@ -313,22 +313,22 @@ fn a_small_loop_keeps_the_older_origin_component_by_component() {
     state.alpha_in = Components::of(traceless(-0.1, 0.1));
     state.alpha_min = Components([-0.3, 0.02, 0.15]);
     state.alpha_max = Components([0.1, 0.3, 0.25]);
-    // Trackers first: the component whose origin is positive renews its minimum, the others their maximum.
+    // A component with a positive origin updates its minimum, the others their maximum.
     let after = reversed(state, traceless(0.1, -0.7));
     assert_eq!(after.alpha_min, Components([-0.3, 0.02, 0.15]));
     assert_eq!(after.alpha_max, Components([0.1, 0.3, 0.25]));
-    // Loading on with xx and against yy and xy.
+    // xx increases, yy and xy decrease.
     assert_eq!(after.alpha_in, Components([0.0, 0.0, 0.0]));
-    // Loading back with yy: its minimum is positive and kept.
+    // yy increases: its minimum is positive and kept.
     let after = reversed(state, traceless(-0.1, -0.7));
     assert_eq!(after.alpha_in, Components([0.0, 0.02, 0.0]));
     assert_eq!(after.alpha_in_previous, state.alpha_in);
-    // The last origin had the other sign of shear.
+    // The last origin has shear of the opposite sign.
     state.alpha_in = Components::of(traceless(-0.1, -0.1));
     assert_eq!(reversed(state, traceless(-0.1, -0.7)).alpha_in, Components::of(state.alpha));
 }
 
-/// Loose of critical the bounding surface moves a quarter and the dilatancy surface four times as fast.
+/// Loose of critical, the exponent of the bounding surface is `n^b/4` and that of the dilatancy surface `4 n^d`.
 #[test]
 fn surfaces_of_sand_loose_of_critical() {
     let sand = sand(0.15, 320.0, 0.5);
@@ -342,7 +342,7 @@ fn surfaces_of_sand_loose_of_critical() {
     assert_eq!(start(&sand).dilatancy_scale, 1.24);
 }
 
-/// Where the formulas of the defaults leave their range.
+/// The limits of the default formulas.
 #[test]
 fn limits_of_the_defaults() {
     assert_eq!(sand(0.05, 270.0, 0.5).parameters().c_dr, 5.0);
@@ -355,9 +355,9 @@ fn limits_of_the_defaults() {
     assert_eq!(start(&steep).dilatancy_scale, 1.5);
 }
 
-/// Beyond the bounding surface the stress ratio takes no more than half of the stiffness.
+/// The reduction of stiffness by stress ratio is at most one half, also beyond the bounding surface.
 #[test]
-fn stress_ratio_takes_at_most_half_of_the_stiffness() {
+fn stress_ratio_reduces_the_stiffness_by_at_most_half() {
     let sand = sand(0.55, 677.0, 0.40);
     let shear = |ratio: f64| {
         let s = traceless(0.0, 0.5 * ratio * 100.0);
@@ -367,10 +367,10 @@ fn stress_ratio_takes_at_most_half_of_the_stiffness() {
     assert_eq!(shear(1.2), shear(1.5));
 }
 
-/// Inside a long step fabric may outgrow its peak of the last commit: it then spares dilation the loss of the strain
-/// rate factor, and does not turn it into a gain.
+/// Within a long step, fabric may exceed its peak at the last commit. The factor of `C_eps` then does not reduce
+/// dilation, and does not increase it either.
 #[test]
-fn fabric_beyond_its_peak_leaves_dilation_undamaged() {
+fn fabric_beyond_its_peak_leaves_dilation_unchanged() {
     let dilatancy = |ce: f64| {
         let given = Parameters { dr: 0.55, g0: 677.0, hpo: 0.4, ce: Some(ce), ..Parameters::default() };
         let sand = PM4Sand::new(given, super::Options::default()).unwrap();

@@ -10,20 +10,20 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 /// `C_gamma1` over `h_o`: keeps the plastic modulus finite at a reversal.
 const C_GAMMA1_PER_HO: f64 = 1.0 / 200.0;
-/// `C_D`: how fast contraction fades towards the dilatancy surface.
+/// `C_D`: distance from the dilatancy surface within which contraction decreases.
 const C_D: f64 = 0.16;
-/// Hardening where the bounding image is reached exactly: stands for infinity.
+/// Hardening coefficient exactly at the bounding image, where the formula is infinite.
 const HARDENING_AT_IMAGE: f64 = 1e10;
-/// Below this distance to the bounding image (a ratio) hardening is not divided by it.
+/// Distance to the bounding image (a ratio) below which [`HARDENING_AT_IMAGE`] is used.
 const IMAGE_DISTANCE: f64 = 1e-10;
-/// Largest contraction rate over `A_do`.
+/// Largest contraction rate, relative to `A_do`.
 const CONTRACTION_CAP: f64 = 1.5;
-/// Forced dilation next to `p_min` over `A_do` and the distance of the surfaces.
+/// Forced dilation near `p_min`, relative to `A_do` times the distance between the surfaces.
 const FORCED_DILATION: f64 = 3.5;
-/// Width in stress ratio over which rotated dilatancy gives way at the bounding surface.
+/// Distance in stress ratio from the bounding surface over which unrotated dilatancy replaces the rotated one.
 const BOUNDING_BLEND: f64 = 0.01;
 
-/// Hardening and dilatancy at a point, along its loading direction.
+/// Hardening and dilatancy at a point, for its loading direction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Flow {
     /// Hardening coefficient h of the back-stress ratio.
@@ -36,7 +36,7 @@ pub(super) struct Flow {
     pub plastic_modulus: f64,
     /// Dilatancy D, positive in contraction.
     pub dilatancy: f64,
-    /// `(alpha^d - alpha):n` of the unrotated surface.
+    /// `(alpha^d - alpha):n` for the unrotated dilatancy surface.
     pub dilatancy_distance: f64,
 }
 
@@ -53,7 +53,7 @@ fn fifth(x: f64) -> f64 {
 }
 
 impl PM4Sand {
-    /// Hardening and dilatancy at a point along the direction `n`.
+    /// Hardening and dilatancy at a point for the loading direction `n`.
     #[inline]
     pub(super) fn flow(
         &self,
@@ -69,12 +69,12 @@ impl PM4Sand {
         let image = |ratio: f64| (ratio - c.m) * FRAC_1_SQRT_2;
         let b = n * image(surfaces.bounding) - at.alpha;
         let b_n = b.contract(n);
-        // `n:n`, one except where the direction is not defined.
+        // `n:n` is one, except where the direction is not defined.
         let unit = n.contract(n);
         let alpha_n = at.alpha.contract(n);
         let dilatancy_distance = image(surfaces.dilatancy) * unit - alpha_n;
 
-        // Fabric opposing the loading direction turns the dilatancy surface inwards.
+        // Fabric opposite to the loading direction rotates the dilatancy surface inwards.
         let fabric_n = at.fabric.contract(n);
         let opposing = positive_part(-fabric_n);
         let fabric_change = (memory.fabric_in.contract(n) - fabric_n).abs();
@@ -116,7 +116,7 @@ impl PM4Sand {
         let c_gamma1 = C_GAMMA1_PER_HO * c.ho;
         let apparent = positive_part((at.alpha - memory.alpha_in).contract(n));
         let travelled = positive_part((at.alpha - memory.alpha_in_true).contract(n));
-        // Sustained static shear, felt while the pressure is below that of the strongest fabric.
+        // Effect of sustained static shear; it acts while the pressure is below `p_zp`.
         let unloading = positive_part(memory.p_zp - p);
         let c_ka = 1.0
             + c.c_kaf * (unloading / (unloading + memory.p_min)) * memory.c_zpk1
@@ -152,7 +152,7 @@ impl PM4Sand {
         let c_pmin = 1.0 / (1.0 + p_min_ratio * p_min_ratio);
         let w = c_zin1 * (cumulative - peak) / (3.0 * limit);
         let c_zin2 = (1.0 + w) / (1.0 + 3.0 * w);
-        // Within a long step fabric may outgrow its peak of the last commit: the cube must not turn negative.
+        // Within a long step, fabric may exceed its peak at the last commit; the cube must not become negative.
         let t = (1.0 - opposing * FRAC_1_SQRT_2 / peak).clamp(0.0, 1.0);
         let damage = cumulative * cumulative / limit * (t * t * t) * c.ce * c.ce * c_pzp * c_pmin * c_zin1;
         let rate = ado * c_zin2 / (damage + 1.0);
@@ -181,7 +181,7 @@ impl PM4Sand {
         p: f64,
         distance: f64,
     ) -> f64 {
-        // Contraction fades to nothing between 18 and 2 p_min.
+        // Contraction decreases linearly from 18 p_min to zero at 2 p_min.
         let low_pressure = ((p - 2.0 * memory.p_min) / (16.0 * memory.p_min)).min(1.0);
         if low_pressure <= 0.0 {
             return 0.0;
@@ -192,6 +192,7 @@ impl PM4Sand {
         let path = (at.alpha - memory.alpha_in).contract(n) + SQRT_2 * aiding / memory.limit;
         (rate * path * path).min(CONTRACTION_CAP * memory.ado) * distance / (distance + C_D) * low_pressure
     }
+
     /// `h_p`: resistance to contraction at a state index (manual, section 3.5.1).
     #[inline]
     pub(super) fn contraction_resistance(&self, state_index: f64) -> f64 {

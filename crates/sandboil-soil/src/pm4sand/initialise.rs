@@ -1,4 +1,4 @@
-//! First state from a given effective stress (manual, section 3.9; Chen and Arduino 2021).
+//! Initial state for a given effective stress (manual, section 3.9; Chen and Arduino 2021).
 
 use super::{
     PM4Sand, State,
@@ -7,20 +7,20 @@ use super::{
 };
 use crate::{Deviator, Moduli, SoilError, Stress, error::finite};
 
-/// `p_min` over the larger of initial mean stress and atmospheric pressure.
+/// `p_min`, relative to the larger of initial mean stress and atmospheric pressure.
 const P_MIN_FRACTION: f64 = 0.005;
-/// Peak fabric before any fabric has formed, over its limit.
+/// Initial peak fabric, relative to the fabric limit.
 const PEAK_FABRIC_SEED: f64 = 1e-5;
-/// `p_zp` before the first reversal, over the initial mean stress.
+/// `p_zp` before the first reversal, relative to the initial mean stress.
 const P_ZP_SEED: f64 = 0.01;
 /// Largest default fabric limit.
 const FABRIC_LIMIT_MAX: f64 = 20.0;
 
 impl PM4Sand {
-    /// State at a given effective stress (kPa, tension positive, space axes) and void ratio, at zero strain.
+    /// State at a given effective stress (kPa, tension positive, fixed axes) and void ratio, at zero strain.
     ///
-    /// A stress below `p_min` or outside the surfaces is replaced by the nearest admissible one; the difference is
-    /// kept as an offset that is added to what the host reads, so the host keeps its equilibrium.
+    /// A stress below `p_min` or outside the surfaces is replaced by the nearest admissible one. The difference is
+    /// stored as a constant offset and added to the stress returned to the caller, which keeps its equilibrium.
     pub(super) fn first_state(&self, stress: Stress, void_ratio: f64) -> Result<State, SoilError> {
         if !(void_ratio > 0.0 && void_ratio.is_finite()) {
             return Err(SoilError::InvalidParameter {
@@ -94,7 +94,7 @@ impl PM4Sand {
         const LOOSE_OF_CRITICAL: f64 = 1.24;
         const VERY_DENSE: f64 = 1.5;
         let Surfaces { state_index, bounding, dilatancy } = surfaces;
-        // Equal surfaces (both exponents zero) leave the ratio below undefined.
+        // The ratio below is undefined for equal surfaces (both exponents zero).
         if state_index >= 0.0 || !(bounding > dilatancy) {
             LOOSE_OF_CRITICAL
         } else if bounding > 2.0 {

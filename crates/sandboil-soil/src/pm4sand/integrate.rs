@@ -1,7 +1,7 @@
 //! Integration of the rate equations over a strain increment.
 //!
-//! The tiny yield surface makes the equations stiff: the direction relaxes over a shear strain of about
-//! `m p/(2 G)`, so sub-steps are bound by stability and higher order alone does not pay.
+//! The small yield surface makes the equations stiff: the loading direction adjusts over a shear strain of about
+//! `m p/(2 G)`. Stability therefore limits the sub-steps, and a method of higher order brings little.
 
 use super::{
     PM4Sand, State,
@@ -13,39 +13,40 @@ use super::{
 use crate::{Deviator, Integrator, UpdateReport};
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// Floor of the mean stress over `p_min`.
+/// Lower limit of the mean stress (the pressure floor), relative to `p_min`.
 const FLOOR_FRACTION: f64 = 0.2;
-/// Largest stress ratio kept at the pressure floor, over the critical ratio.
+/// Largest stress ratio kept at the pressure floor, relative to the critical ratio.
 const FLOOR_STRESS_RATIO: f64 = 0.8;
-/// Excess over the largest part that does not yet cut an increment once more: strains carry round-off.
+/// Tolerance, in parts, when an increment is divided, so that round-off of the strain does not add a part.
 const PART_SLACK: f64 = 1e-4;
 /// Cosine between yield normal and elastic stress increment below which a point on the surface first moves inside.
 const INWARD_COSINE: f64 = -1e-4;
-/// Reduction of a sub-step where the equations had no answer, and the strongest one by error.
+/// Smallest factor applied to a rejected sub-step; used also where the equations have no solution.
 const STRONGEST_CUT: f64 = 0.1;
-/// Safety on the sub-step that the error estimate allows.
+/// Safety factor on the sub-step size from the error estimate.
 const SAFETY: f64 = 0.8;
-/// A good sub-step is followed by one of at least this fraction.
+/// Smallest ratio of a sub-step to the accepted one before it.
 const MILDEST_CUT: f64 = 0.5;
-/// Sub-step of Runge-Kutta over the strain `m p/G`: at two the answer is wrong without a warning.
+/// Largest Runge-Kutta sub-step, relative to the strain `m p/G`. At a ratio of two the result is wrong without a
+/// warning.
 const RK4_STABILITY: f64 = 0.5;
-/// Stress scale of the error over atmospheric pressure, where the stress itself is smaller.
+/// Smallest reference stress of the relative error, relative to atmospheric pressure.
 const ERROR_SCALE: f64 = 1.0 / 200.0;
-/// Iterations of the reference drift correction.
+/// Largest number of iterations of the reference drift correction.
 const DRIFT_ITERATIONS: usize = 25;
 
-/// A scheme with its constants.
+/// An integration scheme and its constants.
 #[derive(Debug, Clone, Copy)]
 struct Scheme {
     stages: Stages,
     /// Error allowed per sub-step.
     tolerance: f64,
-    /// Smallest sub-step over the part.
+    /// Smallest sub-step, as a share of the part.
     smallest: f64,
-    /// Largest growth from one sub-step to the next.
+    /// Largest ratio of a sub-step to the one before it.
     growth: f64,
-    /// As implemented by Chen and Arduino (2021): moduli of the last commit, stress error only, iterative drift
-    /// correction, no fabric in a forced acceptance.
+    /// True: as implemented by Chen and Arduino (2021), with moduli of the last commit, error of the stress only,
+    /// iterative drift correction, and no fabric change in a forced acceptance.
     reference: bool,
 }
 
@@ -57,7 +58,7 @@ enum Stages {
 
 impl Scheme {
     fn of(integrator: &Integrator) -> Self {
-        // A thousand sub-steps per part at most; more only hide that the part is too long.
+        // At most a thousand sub-steps per part: if more are needed, the part is too long.
         let base = Self {
             stages: Stages::Two,
             tolerance: Integrator::DEFAULT_TOLERANCE,
@@ -83,7 +84,7 @@ struct Attempt {
 }
 
 impl PM4Sand {
-    /// Cuts an increment into committed parts and advances through them.
+    /// Divides an increment into parts, and integrates and commits each.
     pub(super) fn integrate(
         &self,
         state: &mut State,
@@ -104,7 +105,7 @@ impl PM4Sand {
     /// One committed part: reversal check, elastic or plastic integration, commit.
     fn advance(&self, state: &mut State, mut strain: Strain, scheme: Scheme, report: &mut UpdateReport) {
         if self.options.gap_memory && state.gap > 0.0 {
-            // Grains apart carry nothing: compression first closes the gap, expansion widens it.
+            // Separated grains carry no stress: compression first closes the gap, expansion widens it.
             let closing = strain.volume.min(state.gap);
             state.gap -= closing;
             state.volumetric_strain += closing;
@@ -135,7 +136,8 @@ impl PM4Sand {
         self.commit(state, before.fabric, report);
     }
 
-    /// End of a part (Chen and Arduino 2021): moduli, cap at the bounding surface, cumulative fabric.
+    /// End of a part (Chen and Arduino 2021): updates the moduli, limits the stress to the bounding surface and updates
+    /// the cumulative fabric.
     fn commit(&self, state: &mut State, fabric_before: Deviator, report: &mut UpdateReport) {
         state.moduli = self.committed_moduli(state);
         let p = state.mean.max(state.p_min);
@@ -143,7 +145,8 @@ impl PM4Sand {
         if ratio > state.bounding_ratio {
             report.bounding_caps += 1;
             state.deviator = state.deviator * (state.bounding_ratio / ratio);
-            // Below `p_min` the stress keeps a larger ratio than the formulas see; the yield surface has to reach it.
+            // Below `p_min` the actual stress ratio exceeds the one in the formulas, which use `p_min`. The yield
+            // surface must include the actual ratio.
             let kept = state.bounding_ratio * (p / state.mean);
             state.alpha = state.deviator * ((kept - self.constants.m) / (kept * state.mean));
         }
@@ -154,8 +157,8 @@ impl PM4Sand {
     }
 
     /// The elastic share of a part that ends outside the yield surface. Along an elastic path the squared yield
-    /// function is a quadratic; the wanted root is the one where it grows, whether the path starts inside or first
-    /// moves inside from the surface.
+    /// function is quadratic. The required root is the one where the function increases, both for a path that starts
+    /// inside and for one that starts on the surface and first moves inside.
     fn elastic_share(&self, state: &State, strain: Strain) -> f64 {
         let (dp, ds) = elastic_increment(state.moduli, strain);
         let outward = state.deviator - state.alpha * state.mean;
@@ -172,12 +175,12 @@ impl PM4Sand {
         let b = outward.contract(change) - square * state.mean * dp;
         let c = outward.contract(outward) - square * state.mean * state.mean;
         let root = (b * b - a * c).max(0.0).sqrt();
-        // Two forms of the same root, each free of cancellation on its side.
+        // Two forms of the same root; each avoids cancellation for one sign of `b`.
         let share = if b > 0.0 { -c / (b + root) } else { (root - b) / a };
         if share > 0.0 { share.min(1.0) } else { 0.0 }
     }
 
-    /// Integrates a part that leaves the yield surface; returns where it ends.
+    /// Integrates a part that leaves the yield surface; returns its end point.
     fn integrate_plastic(
         &self,
         state: &mut State,
@@ -198,9 +201,10 @@ impl PM4Sand {
         let strained = state.volumetric_strain + elastic * strain.volume;
         let tolerance = self.yield_tolerance();
 
-        // Share of the rest over which the loading direction relaxes: a longer sub-step is refused, or unstable.
-        let (p_min, strained_shear) = (state.p_min, moduli.shear * rest.largest_component());
-        let relaxation = |p: f64| self.constants.m * p.max(p_min) / strained_shear;
+        // Share of the remaining strain over which the loading direction adjusts. A longer sub-step is rejected, or
+        // unstable.
+        let (p_min, elastic_shear) = (state.p_min, moduli.shear * rest.largest_component());
+        let relaxation = |p: f64| self.constants.m * p.max(p_min) / elastic_shear;
 
         let first = if scheme.reference { 1.0 } else { relaxation(point.p).min(1.0) };
         let (mut remaining, mut size, mut may_grow) = (1.0_f64, first, true);
@@ -223,7 +227,7 @@ impl PM4Sand {
             let mut next = f64::INFINITY;
             let mut end = if let Some(attempt) = attempt {
                 let factor = SAFETY * (scheme.tolerance / attempt.error).sqrt();
-                // Also an error that is not a number is refused here.
+                // NaN is not `<=` the tolerance, so it is rejected too.
                 let good = attempt.error <= scheme.tolerance;
                 if !good && !at_smallest {
                     size = (factor.max(STRONGEST_CUT) * size).max(scheme.smallest);
@@ -246,7 +250,7 @@ impl PM4Sand {
                 }
                 end
             } else if at_smallest {
-                // The equations have no answer here at all: follow the strain elastically, carry the yield surface along.
+                // The equations have no solution here: apply the strain elastically; the yield surface is moved below.
                 report.forced_acceptances += 1;
                 point.moved(&Change::elastic(moduli, step), 1.0)
             } else {
@@ -271,8 +275,8 @@ impl PM4Sand {
         point
     }
 
-    /// Modified Euler and its error: half the difference of the two stages, relative to the stress; also that of
-    /// the back-stress ratio, except in the reference scheme. `None` where a stage has no answer.
+    /// Modified Euler with an error estimate: half the difference of the two stages, relative to the stress. The error
+    /// of the back-stress ratio is included, except in the reference scheme. `None` where a stage has no solution.
     #[inline]
     #[expect(clippy::too_many_arguments, reason = "the context of one sub-step")]
     fn two_stages(
@@ -296,7 +300,7 @@ impl PM4Sand {
         let difference = (2.0 * dp * dp + ds.contract(ds)).sqrt();
         let scale = point.stress_norm();
         let error = if scheme.reference {
-            // Below 0.5 kPa the error is absolute, in kPa (here in units of the atmospheric pressure of 101.3 kPa).
+            // Below 0.5 kPa the error is absolute, in kPa; `unit` is one kPa in the unit of `p_atm`.
             let unit = self.constants.p_atm / 101.3;
             if scale < 0.5 * unit { difference / unit } else { 0.5 * difference / scale }
         } else {
@@ -331,8 +335,8 @@ impl PM4Sand {
         (end.p > 0.0).then_some(Attempt { point: end, error: 0.0, loading_index: k4.loading_index })
     }
 
-    /// Iterative drift correction of the reference scheme (Chen and Arduino 2021), along the plastic flow of the
-    /// last stage while that reduces the drift, else along the yield normal. Fabric is that of the commit.
+    /// Iterative drift correction of the reference scheme (Chen and Arduino 2021). The correction follows the plastic
+    /// flow of the last stage if that reduces the drift, otherwise the yield normal. Fabric is that of the last commit.
     fn correct_drift(
         &self,
         point: &mut Point,
@@ -375,8 +379,8 @@ impl PM4Sand {
         }
     }
 
-    /// The point at the pressure floor: stress ratio limited in size, kept in direction; the yield surface follows,
-    /// fabric and all memory stay. Isotropic out of plane.
+    /// The point at the pressure floor. The stress ratio keeps its direction and is limited in size; the yield surface
+    /// moves with it. The out-of-plane stress equals the mean stress. Fabric and history variables are unchanged.
     fn at_floor(&self, before: &Point, p_min: f64, report: &mut UpdateReport) -> Point {
         report.pressure_floors += 1;
         let floor = FLOOR_FRACTION * p_min;

@@ -1,9 +1,9 @@
 //! PM4Sand version 3.1, plane strain (Boulanger and Ziotopoulou 2017, UCD/CGM-17/01), as implemented by
 //! Chen and Arduino (2021, PEER 2021/02). Framework: Dafalias and Manzari (2004).
 //!
-//! Inside this module compression is positive and a stress is its in-plane mean `p = (xx + yy)/2` and its
-//! deviator `s`; the border types [`Stress`] and [`StrainIncrement`] are tension positive. The whole state lives
-//! in a frame that turns with the material, which is exactly the Jaumann rate for every tensor at once.
+//! Inside this module compression is positive, and a stress is stored as its in-plane mean `p = (xx + yy)/2` and its
+//! deviator `s`. The types of the interface, [`Stress`] and [`StrainIncrement`], are tension positive. The whole state
+//! is stored in a frame that rotates with the material; this gives the Jaumann rate of every tensor.
 
 #[cfg(test)]
 mod check_values;
@@ -23,7 +23,7 @@ pub use surfaces::Surfaces;
 use crate::{Deviator, Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport};
 use state::Strain;
 
-/// Most parts of one increment, so that an integrator with tiny (or no) parts is refused instead of never ending.
+/// Largest number of parts of one increment. An increment that needs more is refused, because it would take too long.
 const MAX_PARTS: f64 = 1e7;
 
 impl SoilModel for PM4Sand {
@@ -33,9 +33,10 @@ impl SoilModel for PM4Sand {
         self.first_state(stress, void_ratio.unwrap_or_else(|| self.constants.initial_void_ratio()))
     }
 
-    /// Moves a state through a strain increment. On error the state is unchanged.
+    /// Updates a state by a strain increment. On error the state is unchanged.
     ///
-    /// Errors: [`SoilError::NonFinite`] for an increment or a result that is not finite,
+    /// # Errors
+    /// [`SoilError::NonFinite`] for an increment or a result that is not finite,
     /// [`SoilError::StrainIncrementTooLarge`] above 1000 % or ten million parts of the integrator.
     fn update(
         &self,
@@ -50,7 +51,7 @@ impl SoilModel for PM4Sand {
             deviator: Deviator { half_difference: -0.5 * (de.xx - de.yy), xy: -0.5 * de.xy },
         };
         if de.spin != 0.0 || state.rotation != 0.0 {
-            // The angle at mid-step makes the split between rotation and strain second-order accurate.
+            // With the angle at mid-step, the combination of rotation and strain is second-order accurate.
             let middle = state.rotation - 0.5 * de.spin;
             strain.deviator = strain.deviator.in_axes_turned(double_angle(middle));
             next.rotation -= de.spin;
@@ -61,7 +62,7 @@ impl SoilModel for PM4Sand {
         Ok(report)
     }
 
-    /// Effective stress in space axes, kPa, tension positive, the offset stress of an inadmissible start included.
+    /// Effective stress in fixed axes, kPa, tension positive, including the offset of an inadmissible initial stress.
     fn stress(&self, state: &State) -> Stress {
         let mean = state.mean + state.offset.mean;
         let mut deviator = state.deviator + state.offset.deviator;
@@ -76,7 +77,7 @@ impl SoilModel for PM4Sand {
         }
     }
 
-    /// Those of the last commit.
+    /// Elastic moduli of the last commit, kPa.
     fn moduli(&self, state: &State) -> Moduli {
         state.moduli
     }
@@ -89,7 +90,7 @@ impl SoilModel for PM4Sand {
         Some(state.void_ratio_at(state.volumetric_strain))
     }
 
-    /// Inside the larger of bounding and dilatancy surface, and not below the smallest pressure.
+    /// True inside the larger of bounding and dilatancy surface and at or above `p_min`.
     fn carries(&self, stress: &Stress) -> bool {
         self.first_state(*stress, self.constants.initial_void_ratio()).is_ok_and(|state| !state.has_offset())
     }

@@ -1,4 +1,4 @@
-//! Parameters: what the user gives, what follows from it.
+//! Parameters given by the user, and the constants derived from them.
 
 use crate::{
     SoilError,
@@ -7,12 +7,12 @@ use crate::{
 
 /// Atmospheric pressure, kPa.
 const P_ATM: f64 = 101.3;
-/// Largest Poisson's ratio used; the bulk modulus stays finite.
+/// Largest Poisson's ratio used, so that the bulk modulus stays finite.
 const NU_MAX: f64 = 0.4999;
 /// Largest critical-state friction angle, degrees, for which `M = 2 sin(phi_cv)` stays below 2.
 const PHI_CV_MAX: f64 = 89.0;
 
-/// Parameters as the user gives them; `None` takes the model's default.
+/// Parameters given by the user; `None` means the default of the model, which each field states.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Parameters {
     /// Apparent relative density `D_R`, fraction in (0, 1].
@@ -23,7 +23,7 @@ pub struct Parameters {
     pub hpo: f64,
     /// Atmospheric pressure, in the unit of stress; 101.3 kPa.
     pub p_atm: Option<f64>,
-    /// Ratio of plastic to elastic modulus.
+    /// Ratio of plastic to elastic modulus; from `D_R`.
     pub ho: Option<f64>,
     /// Largest void ratio; 0.8.
     pub e_max: Option<f64>,
@@ -39,7 +39,7 @@ pub struct Parameters {
     pub z_max: Option<f64>,
     /// Fabric growth rate; 250.
     pub cz: Option<f64>,
-    /// Strain accumulation rate after liquefaction.
+    /// Strain accumulation rate after liquefaction; from `D_R`.
     pub ce: Option<f64>,
     /// Critical-state friction angle, degrees; 33.
     pub phi_cv: Option<f64>,
@@ -47,9 +47,9 @@ pub struct Parameters {
     pub nu: Option<f64>,
     /// Degradation of elastic moduli with fabric; 2.
     pub c_gd: Option<f64>,
-    /// Rotated dilatancy surface.
+    /// Factor of the rotated dilatancy surface; from `D_R`.
     pub c_dr: Option<f64>,
-    /// Effect of sustained static shear on the plastic modulus.
+    /// Effect of sustained static shear on the plastic modulus; from `D_R`.
     pub c_kaf: Option<f64>,
     /// Q of Bolton (1986); 10.
     pub q: Option<f64>,
@@ -57,25 +57,25 @@ pub struct Parameters {
     pub r: Option<f64>,
     /// Yield surface radius; 0.01.
     pub m: Option<f64>,
-    /// Smallest post-shaking stiffness factor.
+    /// Smallest post-shaking stiffness factor; from `D_R`.
     pub f_sed_min: Option<f64>,
     /// Post-shaking pressure scale, in the unit of stress; `p_atm/5`.
     pub p_sed_o: Option<f64>,
 }
 
-/// Choices that are not material parameters.
+/// Options of the model that are not material parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "four independent switches, each of the published model")]
 pub struct Options {
-    /// No plastic modulus (and no hardening) outside the bounding surface, also while dilating: the rule of
+    /// Plastic modulus and hardening are zero outside the bounding surface, also during dilation: the rule of
     /// version 3.3. The reference integrator always follows version 3.1 as implemented.
     pub clamp_plastic_modulus: bool,
-    /// Loading index with `K + G/3`, the exact consistency condition with a two-dimensional mean stress, in place
-    /// of the published `K`. Matters only where shear comes with expansion.
+    /// Loading index with `K + G/3` in place of the published `K`. This is the exact consistency condition for the
+    /// two-dimensional mean stress. It matters only for shear with expansion.
     pub consistent_loading_index: bool,
-    /// Expansion spent at the pressure floor must be recovered before stress builds up again.
+    /// Expansion at the pressure floor must be recovered by compression before stress can increase again.
     pub gap_memory: bool,
-    /// Post-shaking reconsolidation: moduli reduced by `F_sed`, for the analysis of sedimentation only.
+    /// Post-shaking reconsolidation: moduli are multiplied by `F_sed`. Only for the analysis of sedimentation.
     pub post_shaking: bool,
 }
 
@@ -90,7 +90,7 @@ impl Default for Options {
     }
 }
 
-/// The complete set of constants, defaults filled in (manual, section 3.5).
+/// All constants of the model, including defaults (manual, section 3.5).
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Constants {
     /// Apparent relative density, fraction.
@@ -125,7 +125,7 @@ pub struct Constants {
     pub bulk_to_shear: f64,
     /// Degradation of elastic moduli with fabric.
     pub c_gd: f64,
-    /// Rotated dilatancy surface.
+    /// Factor of the rotated dilatancy surface.
     pub c_dr: f64,
     /// Effect of sustained static shear.
     pub c_kaf: f64,
@@ -148,7 +148,7 @@ impl Constants {
     }
 }
 
-/// A validated PM4Sand material.
+/// A PM4Sand material with checked parameters.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PM4Sand {
     pub(super) constants: Constants,
@@ -156,11 +156,14 @@ pub struct PM4Sand {
 }
 
 fn non_negative(name: &'static str, value: f64) -> Result<f64, SoilError> {
-    check(name, value, "not negative, and finite", value >= 0.0)
+    check(name, value, "zero or positive, and finite", value >= 0.0)
 }
 
 impl PM4Sand {
-    /// Checks the parameters and fills in the defaults.
+    /// Checks the parameters and sets the defaults.
+    ///
+    /// # Errors
+    /// [`SoilError::InvalidParameter`] for a parameter outside its range.
     pub fn new(parameters: Parameters, options: Options) -> Result<Self, SoilError> {
         let given = parameters;
         let dr = check("Dr", given.dr, "in (0, 1]", given.dr > 0.0 && given.dr <= 1.0)?;
@@ -213,15 +216,15 @@ impl PM4Sand {
         Ok(Self { constants, options })
     }
 
-    /// The same material under other options. Call [`PM4Sand::refresh_moduli`] on its states after switching
-    /// `post_shaking`.
+    /// The same material with other options. After a change of `post_shaking`, call [`PM4Sand::refresh_moduli`] on each
+    /// state.
     #[must_use]
     pub fn with_options(mut self, options: Options) -> Self {
         self.options = options;
         self
     }
 
-    /// All constants, defaults filled in.
+    /// All constants, including defaults.
     pub fn parameters(&self) -> &Constants {
         &self.constants
     }

@@ -6,16 +6,21 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 /// `C_Kp`: loss of plastic modulus with fabric.
 const C_KP: f64 = 2.0;
-/// Stress over atmospheric pressure below which a direction is not defined.
+/// Stress, relative to atmospheric pressure, below which the loading direction is not defined.
 const NO_DIRECTION: f64 = 1e-12;
 
-/// The quantities that the rate equations integrate, in the model's convention.
+/// The integrated quantities, compression positive, in the material frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point {
+    /// In-plane mean effective stress, kPa.
     pub p: f64,
+    /// In-plane deviator, kPa.
     pub s: Deviator,
+    /// Out-of-plane effective stress, kPa.
     pub out_of_plane: f64,
+    /// Back-stress ratio.
     pub alpha: Deviator,
+    /// Fabric-dilatancy tensor z.
     pub fabric: Deviator,
 }
 
@@ -50,14 +55,14 @@ impl Point {
         }
     }
 
-    /// `|sigma|` of the in-plane stress, kPa.
+    /// Norm `|sigma|` of the in-plane stress, kPa.
     #[inline]
     pub fn stress_norm(&self) -> f64 {
         stress_norm(self.p, self.s)
     }
 }
 
-/// Norm of an in-plane stress given by mean and deviator.
+/// Norm of an in-plane stress with mean `p` and deviator `s`.
 #[inline]
 pub(super) fn stress_norm(p: f64, s: Deviator) -> f64 {
     (2.0 * p * p + s.contract(s)).sqrt()
@@ -90,7 +95,7 @@ impl Change {
     }
 }
 
-/// What the rate equations need from the history, constant between two reversals and two fabric updates.
+/// History variables in the rate equations; constant between two commits.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Memory {
     pub alpha_in: Deviator,
@@ -103,7 +108,7 @@ pub(super) struct Memory {
     pub p_zp: f64,
     pub p_min: f64,
     pub ado: f64,
-    /// `C_zpk1`: how near the cumulative fabric still is to its peak.
+    /// `C_zpk1`: large while the cumulative fabric is still close to the peak fabric.
     pub c_zpk1: f64,
     /// `C_Kp (z_peak/z_max) sqrt(1 - C_zpk2)`.
     pub fabric_softening: f64,
@@ -143,16 +148,16 @@ impl Memory {
     }
 }
 
-/// Which of the two published readings of the model is evaluated.
+/// Variant of the published model that is evaluated.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Reading {
-    /// Moduli held over the integration of one increment; `None`: those of each stage's own stress.
+    /// Constant moduli for the whole part; `None`: each stage uses the moduli at its stress.
     pub held_moduli: Option<Moduli>,
-    /// `K_p = 0` and `h = 0` outside the bounding surface in both branches.
+    /// `K_p = 0` and `h = 0` outside the bounding surface, both in contraction and in dilation.
     pub clamp: bool,
 }
 
-/// Loading direction of a stress (manual, section 3.3).
+/// Loading direction `n` at a stress: the normal to the yield surface (manual, section 3.3).
 #[inline]
 pub(super) fn direction(p: f64, s: Deviator, alpha: Deviator, p_atm: f64) -> Deviator {
     let outward = s - alpha * p;
@@ -167,9 +172,9 @@ pub(super) fn direction(p: f64, s: Deviator, alpha: Deviator, p_atm: f64) -> Dev
 }
 
 impl PM4Sand {
-    /// Change of a point over a strain increment (manual, section 3.6). `None` where the equations have no answer:
-    /// a mean stress that is not positive, or a denominator of the loading index that is not.
-    /// `bounding` receives the bounding ratio of this evaluation.
+    /// Change of a point over a strain increment (manual, section 3.6). `None` where the equations have no solution:
+    /// the mean stress, or the denominator of the loading index, is not positive.
+    /// `bounding` is set to the bounding ratio of this evaluation.
     #[inline]
     pub(super) fn change(
         &self,

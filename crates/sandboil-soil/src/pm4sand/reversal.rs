@@ -3,14 +3,15 @@
 use super::{State, state::Components};
 use crate::{Deviator, UpdateReport};
 
-/// A reversal is near neutral while the trial direction is within this cosine of the tangent.
+/// A reversal is near neutral if the cosine between trial direction and travelled direction is above minus this value.
 const NEAR_NEUTRAL_COSINE: f64 = 0.05;
 
-/// Declares a reversal when the trial direction points back from the last one, and renews what a reversal renews.
+/// Detects a reversal, where the trial direction points back towards the back-stress ratio of the last reversal, and
+/// then updates the history variables.
 pub(super) fn detect(state: &mut State, trial_direction: Deviator, report: &mut UpdateReport) {
     let travelled = state.alpha - state.alpha_in_true;
     let forward = travelled.contract(trial_direction);
-    // A direction that is not a number declares nothing; the update refuses the result afterwards.
+    // NaN is no reversal; the update refuses its result later.
     if !(forward < 0.0) {
         return;
     }
@@ -40,7 +41,8 @@ pub(super) fn detect(state: &mut State, trial_direction: Deviator, report: &mut 
         }
     }
 
-    // A small unload-reload loop on one side keeps the older, apparent origin: no over-stiff response after it.
+    // After a small unload-reload loop on one side of zero shear, the older, apparent origin is kept, so that the
+    // response after the loop is not too stiff.
     let small_loop = state.alpha.xy * state.alpha_in_previous.0[2] > 0.0;
     state.alpha_in = alpha;
     if small_loop {

@@ -1,8 +1,8 @@
-//! What a stress point remembers.
+//! State of a stress point.
 
 use crate::{Deviator, Moduli, SoilError, error::finite};
 
-/// A strain (increment) in the model's convention: compression positive, material frame.
+/// A strain or strain increment, compression positive, in the material frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Strain {
     /// Volumetric strain `e_xx + e_yy`.
@@ -22,8 +22,8 @@ impl Strain {
     }
 }
 
-/// Three independent components. The component rule of the apparent back-stress ratio needs them: it may leave
-/// that tensor slightly non-traceless, and keeps it so.
+/// Three independent components `(xx, yy, xy)`. The apparent initial back-stress ratio is updated component by
+/// component and may therefore have a small trace.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Components(pub [f64; 3]);
 
@@ -34,7 +34,7 @@ impl Components {
         Self([tensor.half_difference, -tensor.half_difference, tensor.xy])
     }
 
-    /// The traceless part, all that a contraction with a traceless direction sees.
+    /// The deviator; it has the same contraction with any traceless direction as the whole tensor.
     #[inline]
     pub fn deviator(self) -> Deviator {
         let [xx, yy, xy] = self.0;
@@ -42,7 +42,8 @@ impl Components {
     }
 }
 
-/// Stress added to what the host receives because the initial stress was not admissible. Compression positive.
+/// Constant stress that replaces the inadmissible part of the initial stress. It is added to the stress returned to the
+/// caller. kPa, compression positive.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Offset {
     pub mean: f64,
@@ -50,7 +51,7 @@ pub(super) struct Offset {
     pub out_of_plane: f64,
 }
 
-/// State of one PM4Sand stress point. Made by [`crate::SoilModel::initialise`]; all tensors in the material frame,
+/// State of one PM4Sand stress point, made by [`crate::SoilModel::initialise`]. All tensors are in the material frame,
 /// compression positive.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
@@ -65,7 +66,7 @@ pub struct State {
     pub(super) void_ratio_initial: f64,
     /// Volumetric strain since initialisation, compression positive.
     pub(super) volumetric_strain: f64,
-    /// Expansion spent at the pressure floor and not yet recovered (gap memory).
+    /// Volumetric expansion at the pressure floor that is not yet recovered (gap memory).
     pub(super) gap: f64,
     /// Back-stress ratio alpha.
     pub(super) alpha: Deviator,
@@ -81,20 +82,20 @@ pub struct State {
     pub(super) fabric: Deviator,
     /// Fabric at the last reversal.
     pub(super) fabric_in: Deviator,
-    /// Cumulative fabric, monotonic.
+    /// Cumulative fabric; it never decreases.
     pub(super) fabric_cumulative: f64,
-    /// Largest fabric so far.
+    /// Largest fabric `|z|/sqrt(2)` so far.
     pub(super) fabric_peak: f64,
     /// Mean stress when `|z| p` was largest, kPa.
     pub(super) p_zp: f64,
     /// Largest `|z| p` at a reversal, kPa.
     pub(super) zp_max: f64,
-    /// No reversal has set `p_zp` yet.
+    /// True until a reversal has set `p_zp`.
     pub(super) before_first_reversal: bool,
     pub(super) moduli: Moduli,
     /// Bounding ratio of the last evaluation.
     pub(super) bounding_ratio: f64,
-    /// Pressure below which the formulas are not followed, kPa.
+    /// Lower limit of the pressure in the formulas, kPa.
     pub(super) p_min: f64,
     pub(super) fabric_limit: f64,
     pub(super) dilatancy_scale: f64,
@@ -109,12 +110,12 @@ impl State {
         self.void_ratio_initial - (1.0 + self.void_ratio_initial) * volumetric_strain
     }
 
-    /// The state, refused if anything that it tells is not a finite number.
+    /// Returns the state, or an error if one of its quantities is not a finite number.
     pub(super) fn finite(self) -> Result<Self, SoilError> {
         let size = |tensor: Deviator| tensor.half_difference.abs() + tensor.xy.abs();
         let offset = self.offset;
         let out_of_plane = self.out_of_plane + offset.out_of_plane;
-        // A sum of sizes bounds every component, whichever way the frame has turned.
+        // This sum of absolute values is an upper bound of every component in any frame.
         let stress = (self.mean + offset.mean).abs() + size(self.deviator + offset.deviator);
         finite("stress", stress + out_of_plane.abs())?;
         finite("back-stress ratio", size(self.alpha))?;
@@ -124,12 +125,12 @@ impl State {
         Ok(self)
     }
 
-    /// Whether the initial stress was inadmissible and is made up for by a constant offset.
+    /// Whether the initial stress was inadmissible, so that the state has a constant offset stress.
     pub fn has_offset(&self) -> bool {
         self.offset.mean != 0.0 || self.offset.deviator != Deviator::ZERO
     }
 
-    /// In-plane mean effective stress p = (xx + yy)/2 of the model, kPa, compression positive.
+    /// In-plane mean effective stress `p = (xx + yy)/2` of the model without the offset, kPa, compression positive.
     pub fn mean_stress(&self) -> f64 {
         self.mean
     }
@@ -164,12 +165,12 @@ impl State {
         self.dilatancy_scale
     }
 
-    /// Lower limit of the pressure used in the formulas, kPa; the mean stress itself never falls below a fifth of it.
+    /// Lower limit of the pressure in the formulas, kPa. The mean stress itself never falls below a fifth of it.
     pub fn minimum_pressure(&self) -> f64 {
         self.p_min
     }
 
-    /// Expansion spent at the pressure floor and not yet recovered; zero unless gap memory is on.
+    /// Volumetric expansion at the pressure floor that is not yet recovered; zero unless gap memory is on.
     pub fn gap_strain(&self) -> f64 {
         self.gap
     }

@@ -6,14 +6,14 @@ use std::f64::consts::SQRT_2;
 
 /// `C_SR,o`: largest loss of elastic stiffness with stress ratio.
 const STRESS_RATIO_DEGRADATION: f64 = 0.5;
-/// Absolute state index beyond which the exponentials have no meaning; keeps every result finite.
+/// Limit of the absolute state index in the exponentials, so that every result is finite.
 const STATE_INDEX_LIMIT: f64 = 3.0;
-/// Smallest `Q - ln(100 p/p_A)`; reached at 220 atmospheres, far above the model's use.
+/// Smallest `Q - ln(100 p/p_A)`; reached at 220 atmospheres, far above the range of the model.
 const CRUSHING_MARGIN: f64 = 1e-3;
-/// Relative guard of the post-shaking pressure in a division.
+/// Smallest post-shaking pressure in a division, relative to atmospheric pressure.
 const TINY: f64 = 1e-10;
 
-/// Stress ratios `q/p` on the bounding and the dilatancy surface, and the state index they follow from.
+/// Stress ratios `q/p` on the bounding and the dilatancy surface, and the state index that they depend on.
 #[derive(Debug, Clone, Copy)]
 pub struct Surfaces {
     /// Relative state parameter index, negative when dense of critical.
@@ -37,14 +37,15 @@ impl PM4Sand {
     }
 
     /// Bounding and dilatancy stress ratios for the relative state parameter index, negative when dense of
-    /// critical (Bolton 1986; manual, sections 3.2 and 3.3). `p` is already limited below by `p_min`.
+    /// critical (Bolton 1986; manual, sections 3.2 and 3.3). `p` must be at least `p_min`.
     #[inline]
     pub(super) fn surfaces(&self, p: f64, void_ratio: f64) -> Surfaces {
         let c = &self.constants;
         let relative_density = (c.e_max - void_ratio) / (c.e_max - c.e_min);
         let critical = c.r / (c.q - (100.0 * p / c.p_atm).ln()).max(CRUSHING_MARGIN);
         let state_index = (critical - relative_density).clamp(-STATE_INDEX_LIMIT, STATE_INDEX_LIMIT);
-        // Loose of critical the bounding surface moves a quarter, the dilatancy surface four times as fast.
+        // Loose of critical, the exponent of the bounding surface is a quarter and that of the dilatancy surface four
+        // times the value dense of critical.
         let (nb, nd) = if state_index > 0.0 { (0.25 * c.nb, 4.0 * c.nd) } else { (c.nb, c.nd) };
         Surfaces {
             state_index,
@@ -53,8 +54,8 @@ impl PM4Sand {
         }
     }
 
-    /// Elastic moduli (manual, section 3.4), with the loss of stiffness by stress ratio and by fabric.
-    /// `p` is the raw mean stress, `fabric_factor` that of [`PM4Sand::fabric_stiffness`].
+    /// Elastic moduli, kPa (manual, section 3.4), with the loss of stiffness by stress ratio and by fabric.
+    /// `p` is the mean stress before its limit `p_min`; `fabric_factor` is from [`PM4Sand::fabric_stiffness`].
     #[inline]
     pub(super) fn elastic_moduli(
         &self,
@@ -71,13 +72,13 @@ impl PM4Sand {
         Moduli::from_shear(c.g0 * (c.p_atm * p).sqrt() * stress_factor * fabric_factor, c.bulk_to_shear)
     }
 
-    /// Factor of the elastic moduli for the fabric accumulated so far.
+    /// Factor on the elastic moduli for a cumulative fabric, given relative to the fabric limit.
     #[inline]
     pub(super) fn fabric_stiffness(&self, cumulative_over_limit: f64) -> f64 {
         (1.0 + cumulative_over_limit) / (1.0 + self.constants.c_gd * cumulative_over_limit)
     }
 
-    /// Moduli of a state under the given bounding ratio, post-shaking reduction included.
+    /// Moduli of a state, including the post-shaking reduction.
     #[inline]
     pub(super) fn committed_moduli(&self, state: &State) -> Moduli {
         let fabric = self.fabric_stiffness(state.fabric_cumulative / state.fabric_limit);
@@ -85,8 +86,8 @@ impl PM4Sand {
         self.elastic_moduli(state.mean, state.deviator, state.p_min, state.bounding_ratio, factor)
     }
 
-    /// Post-shaking stiffness factor `F_sed` (manual, section 3.8); one while shaking. First power of
-    /// `p/(20 p_sed)`, as implemented by Chen and Arduino (2021).
+    /// Post-shaking stiffness factor `F_sed` (manual, section 3.8); one during shaking. `p/(20 p_sed)` has the
+    /// exponent one, as implemented by Chen and Arduino (2021).
     pub(super) fn sedimentation_factor(&self, state: &State) -> f64 {
         if !self.options.post_shaking {
             return 1.0;
@@ -102,7 +103,7 @@ impl PM4Sand {
         (c.f_sed_min + (1.0 - c.f_sed_min) * recovery).min(1.0)
     }
 
-    /// Recomputes the moduli of a state from what it holds; needed only after switching options.
+    /// Recomputes the moduli of a state; needed only after a change of options.
     pub fn refresh_moduli(&self, state: &mut State) {
         state.moduli = self.committed_moduli(state);
     }

@@ -1,5 +1,5 @@
-//! What tests, bench and example share: the calibrations and strain paths they drive a point along.
-#![allow(dead_code, reason = "each user needs a part")]
+//! Calibrations and strain paths shared by tests, bench and example.
+#![allow(dead_code, reason = "each user needs only a part")]
 #![allow(clippy::unwrap_used, reason = "a failure here is a failure of the test")]
 #![allow(
     clippy::cast_possible_truncation,
@@ -41,7 +41,7 @@ pub fn rotated([xx, yy, xy]: [f64; 3], angle: f64) -> [f64; 3] {
     [mean + turned, mean - turned, xy * cos + difference * sin]
 }
 
-/// Updates a state that cannot fail.
+/// Updates a state; panics on error.
 pub fn advance(
     sand: &PM4Sand,
     state: &mut State,
@@ -56,8 +56,8 @@ pub fn anisotropic() -> Stress {
     Stress { xx: -0.5 * SIGMA_V0, yy: -SIGMA_V0, xy: 0.0, zz: -0.5 * SIGMA_V0 }
 }
 
-/// State at [`anisotropic`] stress whose void ratio counts the strain of an elastic consolidation with
-/// `G = G_o p_A` and Poisson's ratio 1/3.
+/// State at [`anisotropic`] stress. The void ratio includes the strain of an elastic consolidation with `G = G_o p_A`
+/// and Poisson's ratio 1/3.
 pub fn consolidated(sand: &PM4Sand) -> State {
     let c = sand.parameters();
     let mean = 0.75 * SIGMA_V0;
@@ -83,7 +83,7 @@ pub fn parts(increment: &StrainIncrement, largest: f64) -> (u32, StrainIncrement
 /// One row of a reference strain path.
 #[derive(Debug, Clone, Copy)]
 pub struct Row {
-    /// Number of commits of the reference so far.
+    /// Number of commits of the reference up to this row.
     pub step: u32,
     /// Strain xx, yy and engineering shear, tension positive.
     pub strain: [f64; 3],
@@ -91,14 +91,14 @@ pub struct Row {
     pub stress: [f64; 3],
 }
 
-/// A reference strain path: origin in `tests/data/pm4sand_strain_paths/README.md`.
+/// A reference strain path; for its origin see `tests/data/pm4sand_strain_paths/README.md`.
 pub struct StrainPath {
     pub name: &'static str,
     pub calibration: (f64, f64, f64),
     pub rows: Vec<Row>,
 }
 
-/// Difference of stress from a reference path, kPa, over all rows and components, and what it cost.
+/// Difference of stress from a reference path, kPa, over all rows and components, and the counters of the updates.
 #[derive(Debug, Default)]
 pub struct Difference {
     pub rms: f64,
@@ -133,7 +133,7 @@ impl StrainPath {
         sand.initialise(Stress { xx, yy, xy, zz: xx }, None).unwrap()
     }
 
-    /// Strain increments from row to row, each with the row it leads to.
+    /// Strain increments between rows, each with the row at its end.
     pub fn legs(&self) -> impl Iterator<Item = (StrainIncrement, &Row)> {
         self.rows.windows(2).map(|pair| {
             let [xx, yy, xy] = [0, 1, 2].map(|i| pair[1].strain[i] - pair[0].strain[i]);
@@ -141,7 +141,7 @@ impl StrainPath {
         })
     }
 
-    /// Drives a point along the path with host increments of at most `host_increment`.
+    /// Updates a point along the path with increments of at most `host_increment`.
     pub fn compare(&self, sand: &PM4Sand, integrator: &Integrator, host_increment: f64) -> Difference {
         let mut state = self.start(sand);
         let mut difference = Difference::default();
@@ -162,22 +162,22 @@ impl StrainPath {
     }
 }
 
-/// Cyclic simple shear at constant volume, reversed exactly where the shear stress reaches `csr * SIGMA_V0`.
+/// Results of cyclic simple shear at constant volume, reversed exactly where the shear stress reaches `csr * SIGMA_V0`.
 #[derive(Debug, Default)]
 pub struct CyclicShear {
     /// Vertical effective stress at the end of each half cycle, kPa, compression positive.
     pub vertical_stress: Vec<f64>,
-    /// Cycles until the shear strain first reaches 3 %, the last half cycle by its share in shear stress.
+    /// Cycles until the shear strain first reaches 3 %; the last half cycle is interpolated in shear stress.
     pub cycles: f64,
     /// Cumulative fabric when the shear strain first reaches 3.5 %.
     pub cumulative_fabric: f64,
-    /// Shear strain travelled to 3.5 %.
+    /// Accumulated absolute shear strain up to 3.5 %.
     pub travel: f64,
     pub report: UpdateReport,
 }
 
-/// Cyclic shear from [`consolidated`] to 3.5 % shear strain, in steps of `step`, first load positive. A test that
-/// never liquefies ends after 60 half cycles and gives infinite cycles.
+/// Cyclic shear from [`consolidated`] to 3.5 % shear strain, in steps of `step`, first towards positive stress. A test
+/// without liquefaction ends after 60 half cycles, with an infinite number of cycles.
 pub fn cyclic_shear(sand: &PM4Sand, csr: f64, integrator: &Integrator, step: f64) -> CyclicShear {
     const COUNTED: f64 = 0.03;
     const LAST: f64 = 0.035;
@@ -186,7 +186,7 @@ pub fn cyclic_shear(sand: &PM4Sand, csr: f64, integrator: &Integrator, step: f64
     let mut state = consolidated(sand);
     let (mut strain, mut direction, mut stress) = (0.0_f64, 1.0, 0.0);
     while strain.abs() < LAST && test.vertical_stress.len() < 60 {
-        // What is left to the target after a share of a step.
+        // State after a share of a step, and its shear stress beyond the target.
         let moved = |share: f64| {
             let mut next = state;
             let report = advance(sand, &mut next, &shear(direction * share * step), integrator);
