@@ -297,7 +297,7 @@ def test_the_shear_cell_is_told_as_a_test_at_one_point(tmp_path: Path) -> None:
     out = tmp_path / "cell.csv"
     told = called("lab", "cell", *SAND, "--csr", 0.3, "--spacing", 0.02, "--max-cycles", 1, "--out", out)
     assert "largest spread" in told.stdout
-    assert "max_cycles = 1 were done" in told.stdout
+    assert "max_cycles = 1 was reached" in told.stdout
     assert out.read_text(encoding="utf-8").startswith("gamma,tau,sigma_v_eff")
     assert "lab.shear_cell.size" in refused("lab", "cell", *SAND, "--csr", 0.3, "--spacing", 0.025)
 
@@ -371,7 +371,7 @@ def test_motion_convert_scales_filters_and_changes_the_form(record: Path, tmp_pa
     expected = Motion.from_csv(record).filtered(high=20.0).scaled(pga_g=0.2)
     np.testing.assert_allclose(Motion.from_at2(out).acceleration_g, expected.acceleration_g, atol=1e-7)
     assert "must end in .at2, .csv" in refused("motion", "convert", record, "--out", tmp_path / "x.txt")
-    assert "must be stated" in refused("motion", "info", unitless(tmp_path))
+    assert "must be given" in refused("motion", "info", unitless(tmp_path))
 
 
 def test_motion_deconvolve_writes_the_base_s_motion_and_tells_strains(

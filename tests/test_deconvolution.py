@@ -1,4 +1,4 @@
-"""Deconvolution: closed forms, the way up and down again, our own solver, convergence, doubts, refusals."""
+"""Deconvolution: closed forms, convolution and back, the solver, convergence, warnings, errors."""
 
 from __future__ import annotations
 
@@ -45,24 +45,24 @@ LAYERED = SiteProfile(
 def ground(
     *, thickness: float = 1.0, count: int = 10, Vs: float = 200.0, stress: float = 50.0
 ) -> SiteProfile:
-    """Layers of sand on rock with the published curve of one stress, kPa."""
+    """Layers of sand on rock, all with the published curve at `stress`, kPa."""
     return SiteProfile([SiteLayer(thickness, 19.0, Vs, curve=darendeli(stress))] * count, half_space=ROCK)
 
 
 def pulse(quiet: float = 0.5, dt: float = 0.0025, **changes: Any) -> Motion:
-    """A Ricker pulse of 4 Hz with quiet time before, s, and 4 s in all."""
+    """A Ricker pulse of 4 Hz in a record of 4 s, with `quiet` seconds of zeros before it."""
     ricker = Motion.ricker(frequency=4.0, pga_g=0.05, dt=dt)
     before = np.zeros(round(quiet / dt))
     samples = np.concatenate([before, ricker.acceleration_g])
     return Motion(dt=dt, acceleration_g=np.pad(samples, (0, round(4.0 / dt) - samples.size)), **changes)
 
 
-def sent_up(
+def convolved(
     outcrop: Motion, profile: SiteProfile, G_ratio: Any = None, damping: Any = None
 ) -> tuple[Motion, Motion]:
-    """Motions at the surface and within the base to which an outcrop motion leads.
+    """Motions at the surface and within the base that belong to an outcrop motion.
 
-    By matrices for displacement and shear stress, layer by layer, with small-strain values unless given.
+    Computed with transfer matrices of displacement and shear stress. Default: values at small strain.
     """
     small = np.array([layer.at(0.0) for layer in profile.layers]).T
     ratios, dampings = (small[0], small[1]) if G_ratio is None else (G_ratio, damping)
@@ -83,11 +83,11 @@ def sent_up(
     )
 
 
-def difference(found: Motion, wanted: Motion, below: float) -> float:
-    """Largest difference of two spectra below a frequency, Hz, over the largest of `wanted`."""
-    size = 4 * wanted.acceleration_g.size
-    kept = np.fft.rfftfreq(size, wanted.dt) < below
-    a, b = (np.fft.rfft(motion.acceleration_g, size)[kept] for motion in (found, wanted))
+def difference(found: Motion, expected: Motion, below: float) -> float:
+    """Largest difference of two Fourier spectra below a frequency, Hz, over the largest of `expected`."""
+    size = 4 * expected.acceleration_g.size
+    kept = np.fft.rfftfreq(size, expected.dt) < below
+    a, b = (np.fft.rfft(motion.acceleration_g, size)[kept] for motion in (found, expected))
     return float(np.abs(a - b).max() / np.abs(b).max())
 
 
@@ -104,7 +104,7 @@ def difference(found: Motion, wanted: Motion, below: float) -> float:
         ("base", "upgoing"),
     ],
 )
-def test_one_undamped_layer_shifts_the_record_both_ways(at: str, kind: str) -> None:
+def test_one_undamped_layer_gives_the_sum_of_two_shifted_records(at: str, kind: str) -> None:
     """2 A = (1 + a)/2 s(t + T) + (1 - a)/2 s(t - T)."""
     travel, dt = 0.05, 0.0025
     profile = SiteProfile([SiteLayer(10.0, 18.0, 200.0)], half_space=HalfSpace(22.0, 500.0))
@@ -131,15 +131,15 @@ def test_one_damped_layer_has_the_transfer_function_of_the_textbook(damping: flo
     kept = (frequency > 1.0) & (frequency < 10.0)
     amplitude = [np.abs(np.fft.rfft(motion.acceleration_g, size))[kept] for motion in (base, surface)]
     kH = 2.0 * np.pi * frequency[kept] * thickness / Vs
-    # The textbook leaves out terms of the order of the squared damping.
+    # The textbook formula neglects terms of second order in damping.
     exact = np.sqrt(np.cos(kH) ** 2 + np.sinh(damping * kH) ** 2)
     np.testing.assert_allclose(amplitude[0] / amplitude[1], exact, atol=1e-4 + 4.0 * damping**2)
 
 
 @pytest.mark.parametrize("at", ["surface", "base"])
-def test_a_motion_sent_up_by_matrices_comes_back(at: str) -> None:
+def test_deconvolution_inverts_convolution_by_matrices(at: str) -> None:
     outcrop = Motion.synthetic(pga_g=0.1, duration=20.0)
-    surface, within = sent_up(outcrop, LAYERED)
+    surface, within = convolved(outcrop, LAYERED)
     found = deconvolution(surface if at == "surface" else within, LAYERED, at=at, linear=True)
     assert difference(found.motion, outcrop, below=20.0) < 0.01
     assert (found.converged, found.iterations) == (True, 1)
@@ -147,15 +147,15 @@ def test_a_motion_sent_up_by_matrices_comes_back(at: str) -> None:
     np.testing.assert_allclose(found.damping, [0.03, 0.02, 0.01])
 
 
-def test_slow_waves_strain_the_ground_by_its_inertia() -> None:
-    """Far below the first frequency of the ground gamma = rho z a / G."""
+def test_strain_of_slow_waves_is_quasi_static() -> None:
+    """Far below the first natural frequency of the ground, gamma = rho z a / G."""
     record = Motion.ricker(frequency=0.5, pga_g=0.01)
     profile = SiteProfile([SiteLayer(1.0, 18.0, 300.0)] * 3, half_space=ROCK)
     expected = profile.depth * 0.01 * 9.81 / 300.0**2
     np.testing.assert_allclose(deconvolution(record, profile).strain, expected, rtol=2e-3)
 
 
-def test_a_velocity_stays_one() -> None:
+def test_a_motion_given_by_velocity_gives_a_velocity() -> None:
     surface = pulse()
     as_velocity = Motion(dt=surface.dt, velocity=surface.velocity)
     found = as_velocity.deconvolved(LAYERED, linear=True)
@@ -163,21 +163,21 @@ def test_a_velocity_stays_one() -> None:
     assert difference(found, surface.deconvolved(LAYERED, linear=True), below=15.0) < 0.01
 
 
-def test_waves_above_the_cut_are_taken_away() -> None:
+def test_frequencies_above_the_cut_are_removed() -> None:
     fast = 0.01 * np.sin(2.0 * np.pi * 40.0 * pulse().time)
     noisy = Motion(dt=0.0025, acceleration_g=pulse().acceleration_g + fast)
     options: dict[str, Any] = {"linear": True, "max_frequency": 15.0}
-    found, wanted = (motion.deconvolved(LAYERED, **options) for motion in (noisy, pulse()))
-    # What begins and ends at once has a little of every frequency.
-    np.testing.assert_allclose(found.acceleration_g, wanted.acceleration_g, rtol=0.0, atol=0.1 * 0.01)
+    found, expected = (motion.deconvolved(LAYERED, **options) for motion in (noisy, pulse()))
+    # The sine begins and ends suddenly, so it has a small part at every frequency.
+    np.testing.assert_allclose(found.acceleration_g, expected.acceleration_g, rtol=0.0, atol=0.1 * 0.01)
 
 
-# Our own solver
+# The solver of sandboil
 
 
-def test_our_solver_s_surface_motion_leads_back_to_what_was_sent(tmp_path: Path) -> None:
-    """Two elastic layers under water on stiffer ground: 40 particles in the shortest wave of 10 Hz."""
-    sent = Motion.ricker(frequency=4.0, pga_g=0.1)
+def test_the_surface_motion_of_a_run_gives_back_its_input_motion(tmp_path: Path) -> None:
+    """Two saturated elastic layers on a stiffer base, with 40 particles per shortest wavelength at 10 Hz."""
+    applied = Motion.ricker(frequency=4.0, pga_g=0.1)
     soils = {
         "soft": (Elastic(G=2.0e4, K=5.0e4), (6.0, 12.0)),
         "stiff": (Elastic(G=6.0e4, K=1.5e5), (0.0, 6.0)),
@@ -190,26 +190,26 @@ def test_our_solver_s_surface_motion_leads_back_to_what_was_sent(tmp_path: Path)
             Region(name, box(x=(0, 0.5), y=y), soil, Gs=2.67, porosity=0.4)
             for name, (soil, y) in soils.items()
         ],
-        stages=[Gravity(), Shaking(sent, base=CompliantBase(Vs=400.0, density=2.2), duration=4.0)],
+        stages=[Gravity(), Shaking(applied, base=CompliantBase(Vs=400.0, density=2.2), duration=4.0)],
         output=Output(history_dt=0.005),
     )
     surface = run(scene, tmp_path / "run", threads=1).history("acceleration_x", unit="g")
     record = Motion(dt=float(surface.time[1]), acceleration_g=surface.values)
     found = record.deconvolved(scene.profile(), linear=True)
-    wanted = np.interp(record.time, sent.time, sent.acceleration_g, right=0.0)
-    assert difference(found, Motion(dt=record.dt, acceleration_g=wanted), below=10.0) < 0.02
-    # Without the ground taken off, it is another motion altogether.
-    assert difference(record, Motion(dt=record.dt, acceleration_g=wanted), below=10.0) > 0.5
+    expected = np.interp(record.time, applied.time, applied.acceleration_g, right=0.0)
+    assert difference(found, Motion(dt=record.dt, acceleration_g=expected), below=10.0) < 0.02
+    # Without deconvolution the two motions are very different.
+    assert difference(record, Motion(dt=record.dt, acceleration_g=expected), below=10.0) > 0.5
 
 
 # Equivalent-linear analysis
 
 
-def test_what_equivalent_linear_ground_sends_up_comes_back_with_the_same_strains() -> None:
+def test_equivalent_linear_deconvolution_inverts_convolution_with_the_same_strains() -> None:
     outcrop = Motion.synthetic(pga_g=0.1, duration=20.0)
     options: dict[str, Any] = {"tolerance": 1e-4, "max_frequency": 15.0}
     up = deconvolution(outcrop, ground(), at="base", **options)
-    surface, _ = sent_up(up.motion, ground(), up.G_ratio, up.damping)
+    surface, _ = convolved(up.motion, ground(), up.G_ratio, up.damping)
     down = deconvolution(surface, ground(), **options)
     assert up.converged
     assert down.converged
@@ -231,7 +231,7 @@ def level_ground() -> Scene:
     return Scene.from_toml(Path(__file__).parents[1] / "examples" / "level_ground" / "scene.toml")
 
 
-def test_the_level_ground_s_sand_softens_with_the_motion() -> None:
+def test_stiffness_of_level_ground_decreases_with_the_motion() -> None:
     profile = level_ground().profile()
     weak, strong = (deconvolution(Motion.synthetic(pga_g=pga), profile) for pga in (0.05, 0.1))
     assert not weak.doubts
@@ -239,7 +239,7 @@ def test_the_level_ground_s_sand_softens_with_the_motion() -> None:
     assert weak.iterations < strong.iterations
     assert (strong.strain > weak.strain).all()
     assert (strong.G_ratio < weak.G_ratio).all()
-    # pystrata 0.5.4 finds the same, with the same curves: the largest strain and the stiffness there.
+    # pystrata 0.5.4 gives this largest strain, and this stiffness at it, with the same curves.
     assert weak.strain.max() == pytest.approx(1.4e-4, rel=0.02)
     assert weak.G_ratio.min() == pytest.approx(0.648, abs=0.01)
 
@@ -251,11 +251,11 @@ def test_a_surface_motion_that_loose_sand_cannot_carry_is_refused() -> None:
         Motion.synthetic(pga_g=0.3).deconvolved(level_ground().profile())
 
 
-def test_the_published_curve_is_that_of_pystrata() -> None:
+def test_the_published_curve_agrees_with_pystrata() -> None:
     """DarendeliSoilType of pystrata 0.5.4, plasticity index 15 %, 100 kPa."""
     curve = darendeli(100.0, 15.0, strains=[1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
     np.testing.assert_allclose(curve.G_ratio, [0.996701, 0.973263, 0.81435, 0.345801, 0.059882], atol=1e-6)
-    # Its printed constants differ in the last digit.
+    # The constants of pystrata differ in the last printed digit.
     np.testing.assert_allclose(curve.damping, [0.010247, 0.012627, 0.033389, 0.122652, 0.204751], rtol=2e-4)
 
 
@@ -270,7 +270,8 @@ def test_a_scene_gives_the_small_strain_stiffness_at_rest() -> None:
     assert isinstance(sand.material, PM4Sand)
     phases = sand.resolved(level_ground())
     assert profile.layers[0].unit_weight == pytest.approx(9.81 * phases.saturated_density)
-    # G = G0 p_atm sqrt(p/p_atm), but for the stress ratio's factor, which depends a little on the pressure.
+    # G = G0 p_atm sqrt(p/p_atm), except for the factor of the stress ratio, which depends slightly on
+    # pressure.
     speeds = np.array([layer.Vs for layer in profile.layers[:4]])
     np.testing.assert_allclose(speeds / speeds[0], (profile.depth[:4] / profile.depth[0]) ** 0.25, rtol=5e-3)
     assert profile.base.Vs > profile.layers[-1].Vs
@@ -280,7 +281,7 @@ def test_a_scene_gives_the_small_strain_stiffness_at_rest() -> None:
     np.testing.assert_allclose(curve.G_ratio, darendeli(mean_stress).G_ratio)
 
 
-def test_elastic_ground_stays_linear_and_the_base_is_the_scene_s() -> None:
+def test_elastic_ground_has_no_curve_and_the_half_space_is_the_base_of_the_scene() -> None:
     soils = {"a": Elastic(G=2.0e4, K=5.0e4), "b": PressureElastic(G=6.0e4, K=1.5e5)}
     scene = Scene(
         spacing=0.5,
@@ -295,11 +296,11 @@ def test_elastic_ground_stays_linear_and_the_base_is_the_scene_s() -> None:
     assert [layer.thickness for layer in profile.layers] == [2.0, 2.0]
     assert profile.layers[0].Vs == pytest.approx((2.0e4 / (18.0 / 9.81)) ** 0.5)
     assert profile.base == HalfSpace(2.0 * 9.81, 500.0)
-    # No layer is thinner than a particle's cell.
+    # No layer is thinner than the spacing of particles.
     assert len(scene.profile(thickness=1e-3).layers) == 8
 
 
-def test_curves_may_be_the_soil_model_s_own() -> None:
+def test_curves_may_be_those_of_the_soil_model() -> None:
     scene = Scene(
         spacing=1.0,
         water=Water(),
@@ -314,13 +315,13 @@ def test_curves_may_be_the_soil_model_s_own() -> None:
     assert 0.15 < damping < 0.4
 
 
-def test_a_profile_without_half_space_stands_on_its_lowest_layer() -> None:
+def test_the_default_half_space_has_the_properties_of_the_lowest_layer() -> None:
     assert SiteProfile([SiteLayer(1.0, 18.0, 100.0), SiteLayer(2.0, 19.0, 150.0)]).base == HalfSpace(
         19.0, 150.0
     )
 
 
-# Doubts
+# Warnings
 
 
 @pytest.mark.parametrize(
@@ -337,7 +338,7 @@ def test_a_profile_without_half_space_stands_on_its_lowest_layer() -> None:
             Motion.synthetic(pga_g=0.01),
             SiteProfile([SiteLayer(30.0, 18.0, 100.0, damping=0.1)]),
             {},
-            "waves of 20 Hz are amplified",
+            "waves of 20 Hz, and their noise, are amplified",
         ),
         (
             pulse(quiet=0.0),
@@ -348,14 +349,14 @@ def test_a_profile_without_half_space_stands_on_its_lowest_layer() -> None:
     ],
     ids=["not converged", "strain", "amplification", "lost"],
 )
-def test_a_doubtful_motion_says_why(
+def test_a_doubtful_motion_gives_a_warning_with_the_reason(
     record: Motion, profile: SiteProfile, options: dict[str, Any], message: str
 ) -> None:
     with pytest.warns(DeconvolutionWarning, match=message):
         record.deconvolved(profile, **options)
 
 
-def test_the_report_is_a_page_for_people() -> None:
+def test_the_report_has_convergence_layers_and_reasons_for_doubt() -> None:
     found = deconvolution(Motion.synthetic(pga_g=0.1), ground(count=3), max_iterations=1)
     text = str(found)
     assert "1 iterations, not converged" in text
@@ -365,7 +366,7 @@ def test_the_report_is_a_page_for_people() -> None:
     assert "doubtful: stiffness" in text
 
 
-# Refusals
+# Errors
 
 BAD: dict[str, tuple[Callable[[], object], str, object, str]] = {
     "no layers": (lambda: SiteProfile([]), "profile.layers", [], "each a SiteLayer"),
@@ -391,11 +392,11 @@ BAD: dict[str, tuple[Callable[[], object], str, object, str]] = {
         "must be left out with a curve",
     ),
     "half-space": (lambda: HalfSpace(22.0, float("nan")), "half_space.Vs", None, "finite"),
-    "strains fall": (
+    "strains decrease": (
         lambda: ModulusCurve(strain=[1e-3, 1e-4], G_ratio=[1.0, 0.5], damping=[0.0, 0.1]),
         "curve.strain",
         (1e-3, 1e-4),
-        "must rise",
+        "must be strictly increasing",
     ),
     "ragged curve": (
         lambda: ModulusCurve(strain=[1e-4, 1e-3], G_ratio=[1.0], damping=[0.0, 0.1]),
@@ -413,7 +414,7 @@ BAD: dict[str, tuple[Callable[[], object], str, object, str]] = {
         lambda: Motion.ricker(4.0, 0.1).deconvolved(SiteProfile([SiteLayer(100.0, 18.0, 0.1)])),
         "site.deconvolution.motion.duration",
         0.75,
-        "must exceed the 1000 s",
+        "must exceed the travel time of a shear wave through the profile, 1000 s",
     ),
     "cut": (
         lambda: pulse(dt=0.02).deconvolved(LAYERED, max_frequency=25.1),
@@ -452,7 +453,7 @@ BAD: dict[str, tuple[Callable[[], object], str, object, str]] = {
         [0.1],
         "must be a Motion",
     ),
-    "beyond numbers": (
+    "overflow": (
         lambda: deconvolution(
             REST, SiteProfile([SiteLayer(300.0, 18.0, 100.0, damping=0.49)] * 4), linear=True
         ),
@@ -472,14 +473,14 @@ REST = Motion(dt=0.01, acceleration_g=np.zeros(10_000))
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_slips_are_told_with_place_value_and_remedy(case: str) -> None:
-    slip, path, value, told = BAD[case]
+def test_errors_give_place_value_and_remedy(case: str) -> None:
+    call, path, value, part = BAD[case]
     with pytest.raises(InvalidInput) as caught:
-        slip()
+        call()
     assert caught.value.path == path
     if value is not None:
         assert caught.value.value == value
-    assert told in str(caught.value)
+    assert part in str(caught.value)
 
 
 def test_a_motion_at_rest_stays_at_rest() -> None:

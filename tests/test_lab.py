@@ -1,4 +1,4 @@
-"""The laboratory: conventions, counts, and the tests against what elasticity and the definitions say."""
+"""The laboratory: conventions, numbers of cycles, and results against elasticity and definitions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ INTEGRATORS = ("default", "rk4", "reference")
 
 
 class Hooke:
-    """ROCK as a user would write it."""
+    """The material ROCK as a model written by a user."""
 
     def initialise(self, stress: tuple[float, ...], void_ratio: float | None) -> tuple[float, ...]:
         return stress
@@ -47,7 +47,7 @@ def cyclic() -> lab.CyclicTest:
 # Cyclic direct simple shear
 
 
-def test_it_begins_where_it_is_told_to() -> None:
+def test_a_test_begins_at_the_given_stress() -> None:
     test = lab.cyclic_dss(SAND, sigma_v0=80.0, K0=0.6, csr=0.1, static_shear_ratio=0.05, max_cycles=1)
     first = {name: column[0] for name, column in test.columns().items()}
     assert first == pytest.approx(
@@ -68,14 +68,14 @@ def test_it_begins_where_it_is_told_to() -> None:
 
 def test_uniform_shear_turns_about_the_static_stress() -> None:
     test = lab.cyclic_dss(SAND, csr=0.1, static_shear_ratio=0.04, max_cycles=3)
-    assert (test.complete, test.ended) == (True, "max_cycles = 3 were done")
+    assert (test.complete, test.ended) == (True, "max_cycles = 3 was reached")
     peaks = test.peaks()
     np.testing.assert_allclose(peaks.tau / SIGMA, [0.14, -0.06] * 3, rtol=1e-6)
     np.testing.assert_allclose(peaks.cycle, np.arange(0.25, 3.0, 0.5))
     np.testing.assert_array_equal(peaks.turns, np.arange(1, 7))
 
 
-def test_undrained_shear_holds_the_volume_and_drained_shear_the_stress() -> None:
+def test_undrained_shear_keeps_the_volume_and_drained_shear_the_vertical_stress() -> None:
     undrained = lab.cyclic_dss(SAND, csr=0.1, max_cycles=3)
     drained = lab.cyclic_dss(SAND, csr=0.1, max_cycles=3, drained=True)
     assert not undrained.eps_v.any()
@@ -86,15 +86,15 @@ def test_undrained_shear_holds_the_volume_and_drained_shear_the_stress() -> None
     np.testing.assert_allclose(change, (1.0 + drained.void_ratio[0]) * drained.eps_v, rtol=1e-6, atol=1e-12)
 
 
-def test_irregular_shear_turns_where_it_is_told_to() -> None:
+def test_irregular_shear_turns_at_the_given_stresses() -> None:
     turning = [0.05, -0.07, 0.13, 0.1, 0.12]
     test = lab.cyclic_dss(SAND, reversals=turning)
     np.testing.assert_allclose(test.peaks().tau, SIGMA * np.array(turning), rtol=1e-6)
-    assert test.ended == "all reversals were made"
+    assert test.ended == "all reversals were reached"
 
 
 @pytest.mark.parametrize("drained", [True, False])
-def test_strain_turns_where_it_is_told_to(drained: bool) -> None:
+def test_strain_controlled_shear_turns_at_the_given_strains(drained: bool) -> None:
     test = lab.cyclic_dss(SAND, gamma_reversals=np.array([0.002, -0.002, 0.004]), drained=drained)
     np.testing.assert_allclose(test.peaks().gamma, [0.002, -0.002, 0.004], rtol=1e-12)
 
@@ -105,14 +105,14 @@ def test_shear_ends_at_its_strain_limit(cyclic: lab.CyclicTest) -> None:
     assert np.abs(cyclic.gamma).max() == pytest.approx(0.05, abs=2e-5)
 
 
-def test_a_strength_that_is_short_of_the_stress_is_told() -> None:
-    """Below the bounding stress ratio, so not refused, and yet more than drained sand carries."""
+def test_a_csr_above_the_drained_strength_ends_at_the_strain_limit() -> None:
+    """The CSR is below the bounding stress ratio, so it is not refused, but the sand cannot carry it."""
     test = lab.cyclic_dss(SAND, csr=0.7, drained=True)
     assert test.ended == "the shear strain reached gamma_stop = 0.05 before the first turn"
     assert math.isnan(test.cycles_to(gamma_da=0.01))
 
 
-def test_denser_sand_takes_more_cycles() -> None:
+def test_denser_sand_needs_more_cycles() -> None:
     cycles = [
         lab.cyclic_dss(SAND, csr=0.147, void_ratio=e).cycles_to(gamma_sa=0.03) for e in (0.66, 0.635, 0.61)
     ]
@@ -120,21 +120,21 @@ def test_denser_sand_takes_more_cycles() -> None:
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_every_integrator_counts_the_same(integrator: Any, cyclic: lab.CyclicTest) -> None:
+def test_every_integrator_gives_the_same_number_of_cycles(integrator: Any, cyclic: lab.CyclicTest) -> None:
     other = lab.cyclic_dss(SAND, csr=0.147, integrator=integrator)
     assert other.cycles_to(r_u=0.95) == pytest.approx(cyclic.cycles_to(r_u=0.95), abs=0.03)
 
 
-def test_a_coarse_tolerance_is_allowed_and_near(cyclic: lab.CyclicTest) -> None:
+def test_the_largest_tolerance_gives_nearly_the_same_cycles(cyclic: lab.CyclicTest) -> None:
     coarse = lab.cyclic_dss(SAND, csr=0.147, tolerance=1.0e-4)
     assert coarse.cycles_to(gamma_sa=0.03) == pytest.approx(cyclic.cycles_to(gamma_sa=0.03), abs=0.03)
 
 
-# Counts of cycles
+# Numbers of cycles
 
 
 def by_hand(turns: list[float], r_u: list[float]) -> lab.CyclicTest:
-    """A test whose strain goes straight from turn to turn, five rows each, r_u per turn."""
+    """A test with strain linear between turns, five rows for each leg, and the given r_u at each turn."""
     gamma, cycle, made = [0.0], [0.0], [0]
     for k, turn in enumerate(turns):
         begin = gamma[-1]
@@ -160,13 +160,13 @@ def by_hand(turns: list[float], r_u: list[float]) -> lab.CyclicTest:
     )
 
 
-def test_cycles_are_counted_as_they_are_defined() -> None:
+def test_cycles_agree_with_their_definition() -> None:
     test = by_hand([0.01, -0.02, 0.04], [0.2, 0.6, 0.9])
     assert test.cycles_to(r_u=0.4) == pytest.approx(0.5)
     assert test.cycles_to(gamma_sa=0.01) == pytest.approx(0.25)
-    # From 0.01 to -0.02 the distance from the start is 0.015 at five sixths of the stroke.
+    # From 0.01 to -0.02 the change since the start is 0.015 at five sixths of the stroke.
     assert test.cycles_to(gamma_sa=0.015) == pytest.approx(0.25 + 0.5 * 5.0 / 6.0)
-    # The double amplitude counts from turn to turn: the first has none before it.
+    # The double amplitude is the change since the last turn; before the first turn there is none.
     assert test.cycles_to(gamma_da=0.005) == pytest.approx(0.25 + 0.5 / 6.0)
     assert test.cycles_to(gamma_da=0.03) == pytest.approx(0.75)
     assert test.cycles_to(gamma_da=0.06) == pytest.approx(1.25)
@@ -191,10 +191,10 @@ def test_a_higher_level_is_never_reached_earlier(amplitudes: list[float], one: f
         assert math.isnan(first) or 0.0 <= first <= test.cycle[-1]
 
 
-def test_a_count_of_nothing_or_of_two_things_is_refused(cyclic: lab.CyclicTest) -> None:
-    for asked in ({}, {"r_u": 0.9, "gamma_sa": 0.03}):
+def test_cycles_to_no_measure_or_to_two_are_refused(cyclic: lab.CyclicTest) -> None:
+    for measures in ({}, {"r_u": 0.9, "gamma_sa": 0.03}):
         with pytest.raises(InvalidInput, match="exactly one measure of r_u, gamma_sa, gamma_da"):
-            cyclic.cycles_to(**asked)
+            cyclic.cycles_to(**measures)
     with pytest.raises(InvalidInput, match=r"cycles_to\.r_u = -1\.0: must be greater than 0"):
         cyclic.cycles_to(r_u=-1.0)
 
@@ -203,17 +203,17 @@ def test_a_count_of_nothing_or_of_two_things_is_refused(cyclic: lab.CyclicTest) 
 
 
 @pytest.mark.parametrize("drained", [True, False])
-def test_monotonic_shear_goes_to_its_strain(drained: bool) -> None:
+def test_monotonic_shear_reaches_the_given_strain(drained: bool) -> None:
     test = lab.monotonic_dss(SAND, drained=drained, gamma_max=0.02)
     assert test.complete
     assert test.gamma[-1] == pytest.approx(0.02, rel=1e-12)
     assert (np.diff(test.gamma) > 0.0).all()
 
 
-def test_a_strain_path_has_a_row_for_each_asked() -> None:
+def test_a_path_has_one_row_for_each_given_row() -> None:
     strain = np.array([[0.0, 0.0, 0.0], [1e-4, -2e-4, 3e-4], [0.0, -1e-4, -1e-4]])
     test = lab.strain_path(ROCK, stress0=(-50.0, -100.0, 0.0), strain=strain)
-    assert (test.complete, test.ended) == (True, "the whole path was made")
+    assert (test.complete, test.ended) == (True, "the end of the path was reached")
     lame, g = 9.0e4 - 2.0e4, 3.0e4
     pressure = lame * (strain[:, 0] + strain[:, 1])
     expected = np.column_stack(
@@ -230,7 +230,7 @@ def test_a_strain_path_has_a_row_for_each_asked() -> None:
     np.testing.assert_allclose(back.strain, strain, atol=1e-9)
 
 
-def test_a_stress_that_sand_does_not_carry_ends_the_path_incomplete() -> None:
+def test_a_path_is_incomplete_if_the_sand_cannot_carry_a_stress() -> None:
     test = lab.stress_path(SAND, stress0=(-50.0, -100.0, 0.0), stress=[(-50, -100, 20), (-50, -100, 90)])
     assert not test.complete
     assert test.ended.startswith("in leg 2 of 2: the soil does not carry")
@@ -238,7 +238,7 @@ def test_a_stress_that_sand_does_not_carry_ends_the_path_incomplete() -> None:
     assert 20.0 < test.stress[-1, 2] < 90.0
 
 
-def test_plane_strain_compression_holds_what_it_says() -> None:
+def test_plane_strain_compression_keeps_the_lateral_stress_or_the_volume() -> None:
     drained = lab.plane_strain_compression(SAND, drained=True)
     undrained = lab.plane_strain_compression(SAND, axial_strain_max=0.05)
     assert drained.complete
@@ -246,20 +246,20 @@ def test_plane_strain_compression_holds_what_it_says() -> None:
     np.testing.assert_allclose(drained.sigma_h_eff, SIGMA, rtol=1e-5)
     np.testing.assert_allclose(undrained.eps_v, 0.0, atol=1e-12)
     assert drained.axial_strain[-1] == pytest.approx(0.1)
-    # Medium sand contracts, then dilates, and passes a peak.
+    # Medium dense sand contracts, then dilates, and has a peak strength.
     assert drained.eps_v.max() > 0.0 > drained.eps_v[-1]
     assert drained.q.max() > drained.q[-1] > 2.0 * SIGMA
     np.testing.assert_allclose(undrained.excess_pore_pressure, SIGMA - undrained.sigma_h_eff, rtol=1e-12)
 
 
 def test_liquefied_sand_settles_more_with_its_post_shaking_stiffness(cyclic: lab.CyclicTest) -> None:
-    """About 1 % at D_r 0.55 after 5 % of strain; without the factor a fraction of that."""
+    """About 1 % contraction at D_r 0.55 after 5 % shear strain; without the factor less than half of it."""
     before = cyclic.specimen
     assert before is not None
     stress = before.stress
     soft = lab.reconsolidation(cyclic)
     stiff = lab.reconsolidation(cyclic, post_shaking=False)
-    assert before.stress == stress, "the test's own specimen stays"
+    assert before.stress == stress, "the specimen of the test must not change"
     for test in (soft, stiff):
         assert test.complete
         assert test.sigma_v_eff[-1] == pytest.approx(SIGMA, rel=1e-6)
@@ -275,7 +275,7 @@ def test_reconsolidation_keeps_a_static_shear_stress() -> None:
     np.testing.assert_allclose(settled.tau, 0.05 * SIGMA, rtol=1e-4)
 
 
-def test_elastic_soil_neither_softens_nor_damps() -> None:
+def test_elastic_soil_has_constant_modulus_and_no_damping() -> None:
     test = lab.modulus_reduction(ROCK, strains=[1e-6, 1e-4, 1e-2])
     assert test.complete
     np.testing.assert_allclose(test.G, 3.0e4, rtol=1e-9)
@@ -284,7 +284,7 @@ def test_elastic_soil_neither_softens_nor_damps() -> None:
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_sand_softens_and_damps(integrator: Any) -> None:
+def test_modulus_of_sand_decreases_and_damping_increases_with_strain(integrator: Any) -> None:
     test = lab.modulus_reduction(SAND, integrator=integrator)
     assert test.complete
     assert test.G_ratio[0] == pytest.approx(1.0, abs=1e-3)
@@ -293,10 +293,10 @@ def test_sand_softens_and_damps(integrator: Any) -> None:
     assert (np.diff(test.damping) > -1e-6).all()
 
 
-# Models of one's own
+# Models written by the user
 
 
-def test_a_model_in_python_is_tested_as_ours() -> None:
+def test_a_model_in_python_gives_the_results_of_the_built_in_one() -> None:
     for test in (lab.cyclic_dss, lab.monotonic_dss):
         for drained in (False, True):
             extra = {"csr": 0.2, "max_cycles": 3} if test is lab.cyclic_dss else {"gamma_max": 0.01}
@@ -307,28 +307,28 @@ def test_a_model_in_python_is_tested_as_ours() -> None:
                 np.testing.assert_allclose(theirs[name], ours[name], rtol=1e-9, atol=1e-9, err_msg=name)
 
 
-def test_an_exception_of_a_model_reaches_its_author() -> None:
+def test_an_exception_of_a_model_is_raised_to_the_caller() -> None:
     class Broken(Hooke):
         def update(self, state: Any, strain: Any) -> Any:
-            raise ZeroDivisionError("division by my zero")
+            raise ZeroDivisionError("division by zero in the model")
 
-    with pytest.raises(ZeroDivisionError, match="my zero"):
+    with pytest.raises(ZeroDivisionError, match="division by zero in the model"):
         lab.monotonic_dss(Broken())
 
 
-def test_a_model_that_gives_nonsense_is_told() -> None:
-    class Nonsense(Hooke):
+def test_a_modulus_that_is_not_finite_is_refused() -> None:
+    class NotFinite(Hooke):
         def moduli(self, state: Any) -> tuple[float, float]:
             return math.nan, 1.0
 
     with pytest.raises(ValueError, match="must be finite"):
-        lab.monotonic_dss(Nonsense())
+        lab.monotonic_dss(NotFinite())
 
 
-# Tables and pictures
+# Tables and plots
 
 
-def test_a_test_is_a_dataframe(cyclic: lab.CyclicTest) -> None:
+def test_results_convert_to_a_dataframe(cyclic: lab.CyclicTest) -> None:
     frame = cyclic.to_dataframe()
     assert set(frame.columns) == {
         *("gamma", "tau", "sigma_v_eff", "sigma_h_eff", "eps_v", "void_ratio", "cycle", "turns", "r_u")
@@ -342,7 +342,7 @@ def test_a_test_is_a_dataframe(cyclic: lab.CyclicTest) -> None:
     assert "G_ratio" in lab.modulus_reduction(ROCK, strains=[1e-4]).to_dataframe()
 
 
-def test_without_pandas_it_says_how_to_get_it(
+def test_without_pandas_the_error_says_how_to_install_it(
     cyclic: lab.CyclicTest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "pandas", None)
@@ -350,39 +350,39 @@ def test_without_pandas_it_says_how_to_get_it(
         cyclic.to_dataframe()
 
 
-def labelled(figure: Figure) -> list[tuple[str, str]]:
+def labels(figure: Figure) -> list[tuple[str, str]]:
     figure.canvas.draw()
     return [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
 
 
-def test_pictures_show_the_test_and_what_it_is_compared_with(cyclic: lab.CyclicTest) -> None:
+def test_plots_show_the_test_and_the_reference(cyclic: lab.CyclicTest) -> None:
     other = lab.cyclic_dss(SAND, csr=0.16)
     for reference in (other, other.columns()):
         figure = cyclic.plot(reference=reference)
-        assert [y for _, y in labelled(figure)] == [
+        assert [y for _, y in labels(figure)] == [
             *("shear stress, kPa", "shear stress, kPa", "excess pore pressure ratio, 1", "shear strain, %")
         ]
         ours, theirs = figure.axes[0].get_lines()
         np.testing.assert_array_equal(ours.get_xdata(), cyclic.sigma_v_eff)
         np.testing.assert_array_equal(theirs.get_xdata(), other.sigma_v_eff)
     drained = lab.cyclic_dss(SAND, csr=0.1, max_cycles=2, drained=True)
-    assert labelled(drained.plot())[2] == ("cycles, 1", "contraction, %")
-    assert len(labelled(lab.monotonic_dss(SAND, gamma_max=0.01).plot())) == 3
+    assert labels(drained.plot())[2] == ("cycles, 1", "contraction, %")
+    assert len(labels(lab.monotonic_dss(SAND, gamma_max=0.01).plot())) == 3
     compressed = lab.plane_strain_compression(SAND, axial_strain_max=0.01)
-    assert labelled(compressed.plot(reference=compressed))[2][1] == "excess pore pressure, kPa"
-    assert labelled(lab.reconsolidation(cyclic).plot())[0][0] == "contraction, %"
+    assert labels(compressed.plot(reference=compressed))[2][1] == "excess pore pressure, kPa"
+    assert labels(lab.reconsolidation(cyclic).plot())[0][0] == "contraction, %"
     path = lab.strain_path(SAND, stress0=(-50, -100, 0), strain=[(0, 0, 1e-3), (0, 0, 0)])
-    assert labelled(path.plot(reference=path))[0] == ("shear strain xy, %", "shear stress xy, kPa")
+    assert labels(path.plot(reference=path))[0] == ("shear strain xy, %", "shear stress xy, kPa")
     curve = lab.modulus_reduction(SAND, strains=[1e-5, 1e-4])
-    assert [y for _, y in labelled(curve.plot(reference=curve))] == ["$G/G_{max}$, 1", "damping ratio, %"]
+    assert [y for _, y in labels(curve.plot(reference=curve))] == ["$G/G_{max}$, 1", "damping ratio, %"]
 
 
 def test_a_reference_without_a_column_is_refused(cyclic: lab.CyclicTest) -> None:
-    with pytest.raises(InvalidInput, match="must have sigma_v_eff, an array"):
+    with pytest.raises(InvalidInput, match="must have the array sigma_v_eff as attribute or key"):
         cyclic.plot(reference={"gamma": [0.0]})
 
 
-def test_the_arrays_of_a_compression_are_what_their_names_say():
+def test_the_arrays_of_a_compression_test_agree_with_their_definitions():
     test = lab.plane_strain_compression(SAND, sigma_v0=100.0, K0=0.6, axial_strain_max=0.02)
     assert test.excess_pore_pressure[0] == 0.0
     assert test.p[0] == pytest.approx(80.0)
@@ -397,27 +397,27 @@ def test_peaks_keep_the_pore_pressure_ratio_of_the_test():
     assert (test.peaks().r_u == test.r_u[at_turn]).all()
 
 
-def test_the_stress_out_of_the_plane_begins_at_that_of_the_side():
+def test_the_initial_out_of_plane_stress_is_the_horizontal_one():
     test = lab.monotonic_dss(sb.Elastic(G=3e4, K=9e4), sigma_v0=100.0, K0=0.4, gamma_max=1e-3)
     assert test.specimen.stress[3] == pytest.approx(-40.0)
 
 
-def test_the_strength_that_bounds_a_turn_is_that_of_the_void_ratio():
-    """Bolton's critical state at Dr 1/3, whatever Dr the parameters are of."""
+def test_the_allowed_undrained_stress_is_that_of_the_void_ratio():
+    """Bolton's critical state at Dr 1/3 of the given void ratio, not at the Dr of the parameters."""
     pressure = 0.01 * 101.3 * math.exp(10.0 - 1.5 * 3.0)
     bound = math.sin(math.radians(33.0)) * pressure / 101.3
-    with pytest.raises(sb.InvalidInput, match=f"must turn within {bound:.3f}"):
+    with pytest.raises(sb.InvalidInput, match=f"must be at most {bound:.3f} in absolute value"):
         lab.cyclic_dss(SAND, csr=5.0, void_ratio=0.7)
 
 
-def test_the_bounding_ratio_that_bounds_a_drained_turn_is_that_of_the_void_ratio():
-    same = sb.PM4Sand(Dr=0.8, G0=677.0, hpo=0.4)
-    told = []
-    for soil, void_ratio in ((same, None), (SAND, same.initial_void_ratio), (SAND, None)):
-        with pytest.raises(sb.InvalidInput, match="must turn within") as refused:
+def test_the_allowed_drained_stress_is_that_of_the_void_ratio():
+    dense = sb.PM4Sand(Dr=0.8, G0=677.0, hpo=0.4)
+    allowed = []
+    for soil, void_ratio in ((dense, None), (SAND, dense.initial_void_ratio), (SAND, None)):
+        with pytest.raises(sb.InvalidInput, match=r"must be at most .* in absolute value") as refused:
             lab.cyclic_dss(soil, csr=9.0, drained=True, void_ratio=void_ratio)
-        told.append(refused.value.allowed)
-    assert told[0] == told[1] != told[2]
+        allowed.append(refused.value.allowed)
+    assert allowed[0] == allowed[1] != allowed[2]
 
 
 def test_damping_of_perfect_plasticity_is_that_of_the_parallelogram():
@@ -437,7 +437,7 @@ def test_modulus_is_that_of_the_last_loop(cycles):
     assert found.G[0] == pytest.approx((rows.tau[-1] - rows.tau[-2]) / (2.0 * strain), rel=1e-4)
 
 
-def test_contraction_after_a_drained_test_counts_from_its_end():
+def test_contraction_in_reconsolidation_is_zero_at_its_beginning():
     test = lab.cyclic_dss(SAND, drained=True, gamma_reversals=[5e-3, -5e-3])
     assert test.eps_v[-1] > 1e-4
     assert lab.reconsolidation(test).eps_v[0] == 0.0

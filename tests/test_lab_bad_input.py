@@ -1,4 +1,4 @@
-"""The ranges that refusals of the laboratory tell are where soils fail; single slips are in `bad_inputs`."""
+"""Ranges in error messages of the laboratory end where the soil fails; other errors are in `bad_inputs`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ FRICTION = {"phi": 30.0, "G": 5e4, "K": 1e5}
 @pytest.mark.parametrize(
     ("soil", "name", "arguments", "allowed"),
     [
-        # (1 - K0)/2 sigma_v0 is Su; Rankine's coefficients; shear alone on the cone.
+        # (1 - K0)/2 sigma_v0 = Su; Rankine's coefficients; pure shear on the cone.
         (LATERAL, "K0", {"K0": 0.05}, [1.0 - 60.0 / 101.3, 1.0 + 60.0 / 101.3]),
         (sb.MohrCoulomb(c=0.0, **FRICTION), "K0", {"K0": 0.1}, [1.0 / 3.0, 3.0]),
         (
@@ -44,34 +44,34 @@ FRICTION = {"phi": 30.0, "G": 5e4, "K": 1e5}
         ),
     ],
 )
-def test_a_start_beyond_the_strength_of_any_soil_is_refused(
+def test_an_initial_stress_beyond_the_strength_is_refused_with_its_range(
     soil: object, name: str, arguments: dict[str, float], allowed: list[float]
 ) -> None:
-    """The core would replace it by a stress inside, and the test would not be the one that was asked for."""
-    with pytest.raises(InvalidInput) as told:
+    """The core would replace the stress by an admissible one, which is another test than the given one."""
+    with pytest.raises(InvalidInput) as refused:
         lab.monotonic_dss(soil, gamma_max=0.01, **arguments)
-    assert told.value.path == f"lab.monotonic_dss.{name}"
-    range_told = [float(end) for end in re.findall(r"-?\d+\.\d+", told.value.allowed)[:2]]
-    assert range_told == pytest.approx(allowed, abs=1e-3)
+    assert refused.value.path == f"lab.monotonic_dss.{name}"
+    found = [float(end) for end in re.findall(r"-?\d+\.\d+", refused.value.allowed)[:2]]
+    assert found == pytest.approx(allowed, abs=1e-3)
 
 
-def test_a_first_stress_beyond_the_strength_is_told_with_the_share_that_is_carried() -> None:
+def test_an_initial_stress_beyond_the_strength_is_refused_with_the_share_that_is_carried() -> None:
     soil = sb.MohrCoulomb(c=0.0, **FRICTION)
-    with pytest.raises(InvalidInput, match=r"must be 0\.\d+ times that far from isotropic") as told:
+    with pytest.raises(InvalidInput, match=r"can carry 0\.\d+ times the deviator") as refused:
         lab.strain_path(soil, stress0=(-1.0, -100.0, 0.0), strain=[(0.0, 0.0, 1e-3)])
-    share = float(re.findall(r"0\.\d+", told.value.allowed)[0])
-    # sin(phi) of the circle with the centre 50.5 and the radius 49.5.
+    share = float(re.findall(r"0\.\d+", refused.value.allowed)[0])
+    # sin(phi) = 0.5, and the circle has its centre at 50.5 and the radius 49.5.
     assert share == pytest.approx(0.5 * 50.5 / 49.5, abs=2e-3)
 
 
-def test_numbers_of_numpy_are_numbers() -> None:
+def test_numbers_of_numpy_are_accepted() -> None:
     test = lab.cyclic_dss(SAND, csr=np.float32(0.1), max_cycles=np.int64(1), sigma_v0=np.array(100.0))
     assert test.turns[-1] == 2
 
 
-def test_the_allowed_k0_that_is_told_is_the_edge() -> None:
-    told = refusal(lab.cyclic_dss, csr=0.1, K0=0.05)
-    least, most = (float(end) for end in re.findall(r"\d+\.\d+", told.allowed))
+def test_the_allowed_range_of_k0_is_exact() -> None:
+    message = refusal(lab.cyclic_dss, csr=0.1, K0=0.05)
+    least, most = (float(end) for end in re.findall(r"\d+\.\d+", message.allowed))
     for inside, outside in ((least + 1e-3, least - 1e-3), (most - 2e-3, most + 2e-3)):
         lab.cyclic_dss(SAND, csr=0.01, K0=inside, max_cycles=1)
         refusal(lab.cyclic_dss, csr=0.01, K0=outside)
@@ -88,8 +88,7 @@ ANYTHING = st.one_of(st.none(), st.floats(), st.text(max_size=3), st.lists(st.fl
         max_size=3,
     )
 )
-def test_whatever_is_given_is_tested_or_refused(arguments: dict[str, Any]) -> None:
-    """Never another error, and never a result that is not finite."""
+def test_any_argument_gives_a_finite_result_or_is_refused(arguments: dict[str, Any]) -> None:
     try:
         test = lab.cyclic_dss(SAND, **({"csr": 0.1, "max_cycles": 1, "gamma_stop": 0.001} | arguments))
     except InvalidInput:

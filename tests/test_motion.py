@@ -1,4 +1,4 @@
-"""Ground motions: files, integration, baseline, filter, measures, spectra, generators, refusals."""
+"""Ground motions: files, integration, baseline, filter, measures, spectra, generators, errors."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_csv_round_trip(tmp_path_factory: pytest.TempPathFactory, values: list[f
     np.testing.assert_array_equal(Motion.from_csv(path, unit="m/s", kind="upgoing").velocity, motion.velocity)
 
 
-def test_csv_picks_columns_by_name_number_and_unit(tmp_path: Path) -> None:
+def test_csv_columns_are_selected_by_name_number_and_unit(tmp_path: Path) -> None:
     path = tmp_path / "m.csv"
     path.write_text(
         "# a comment\nstation;Time (s);vel_m_s;acc_g\n1;5.00;0.1;0.5\n\n1;5.01;0.2;0.6\n1;5.02;0.3;0.7\n"
@@ -156,7 +156,7 @@ def test_csv_picks_columns_by_name_number_and_unit(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("unit", "in_g"), [("g", 1.0), ("m/s2", 1 / G), ("cm/s2", 0.01 / G)])
-def test_csv_without_telling_names_takes_the_second_column(tmp_path: Path, unit: str, in_g: float) -> None:
+def test_csv_with_unknown_column_names_uses_the_second_column(tmp_path: Path, unit: str, in_g: float) -> None:
     path = tmp_path / "m.csv"
     path.write_text("instant,x,y\n0,0.5,3\n0.02,-1,3\n")
     np.testing.assert_allclose(
@@ -170,7 +170,7 @@ def test_csv_time_may_be_rounded(tmp_path: Path) -> None:
     assert Motion.from_csv(path, unit="g").dt == pytest.approx(1 / 128, rel=1e-12)
 
 
-# Refusals: each names file, place, value and what to do
+# Errors: each gives file, place, value and remedy
 
 
 def bad_at2(body: str) -> Callable[[Path], Motion]:
@@ -185,23 +185,29 @@ HEAD = f"{TITLE}{UNITS_OF_G}"
 NPTS4 = f"{HEAD}NPTS= 4, DT= 0.01 SEC\n"
 
 BAD_FILES: dict[str, tuple[Callable[[Path], Motion], list[str]]] = {
-    "fewer than NPTS": (bad_at2(f"{NPTS4}0.1 0.2\n0.3\n"), ["record.AT2, NPTS = 4", "holds 3", "cut short"]),
+    "fewer than NPTS": (
+        bad_at2(f"{NPTS4}0.1 0.2\n0.3\n"),
+        ["record.AT2, NPTS = 4", "in the file, 3", "incomplete"],
+    ),
     "more than NPTS": (
         bad_at2(f"{NPTS4}0.1 0.2\n0.3 0.4 0.5\n"),
-        ["record.AT2, NPTS = 4", "holds 5", "more than"],
+        ["record.AT2, NPTS = 4", "in the file, 5", "more values than"],
     ),
     "nan": (bad_at2(f"{NPTS4}0.1 0.2\n0.3 NaN\n"), ["record.AT2, line 6 = nan", "finite", "1 of 4"]),
     "inf": (bad_at2(f"{NPTS4}0.1 -inf\n0.3 0.4\n"), ["record.AT2, line 5 = -inf", "finite"]),
     "overflow": (bad_at2(f"{NPTS4}0.1 1e999\n0.3 0.4\n"), ["record.AT2, line 5 = inf", "finite"]),
     "stars": (bad_at2(f"{NPTS4}0.1 0.2\n**** 0.4\n"), ["record.AT2, line 6 = '****'", "must be a number"]),
-    "text amid": (bad_at2(f"{NPTS4}0.1 0.2\nEND OF RECORD\n"), ["line 6 = 'END'", "must be a number"]),
+    "text between numbers": (
+        bad_at2(f"{NPTS4}0.1 0.2\nEND OF RECORD\n"),
+        ["line 6 = 'END'", "must be a number"],
+    ),
     "underscore": (bad_at2(f"{NPTS4}0.1 1_0\n0.3 0.4\n"), ["line 5 = '1_0'"]),
     "zero points": (bad_at2(f"{HEAD}NPTS= 0, DT= 0.01 SEC\n"), ["line 4, NPTS = 0", "between 2 and"]),
     "points not whole": (
         bad_at2(f"{HEAD}NPTS= many, DT= 0.01 SEC\n"),
         ["line 4, NPTS = 'many'", "whole number"],
     ),
-    "points without end": (
+    "too many points": (
         bad_at2(f"{HEAD}NPTS= 99999999999, DT= 0.01\n"),
         ["NPTS = 99999999999", "2000000"],
     ),
@@ -213,7 +219,7 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Motion], list[str]]] = {
     "dt nan": (bad_at2(f"{HEAD}NPTS= 2, DT= NaN SEC\n0.1 0.2\n"), ["line 4, DT = 'NaN'", "finite"]),
     "dt in ms": (bad_at2(f"{HEAD}NPTS= 2, DT= 5.0\n0.1 0.2\n"), ["line 4, DT = '5.0'", "milliseconds"]),
     "wrong unit": (bad_at2(f"{NPTS4}0.1 0.2\n-98.1 0.4\n"), ["line 6 = -98.1", "20 g", "cm/s2"]),
-    "unit unsaid": (
+    "unit missing": (
         bad_at2(f"{TITLE}NPTS= 2, DT= 0.01\n0.1 0.2\n"),
         ["record.AT2, unit = None", "UNITS OF G"],
     ),
@@ -234,7 +240,7 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Motion], list[str]]] = {
     "csv one column": (bad_csv("acc_g\n0.1\n0.2\n"), ["m.csv, line 1 = 'acc_g'", "time column"]),
     "csv empty": (bad_csv("", unit="g"), ["m.csv, line 1 = ''", "header row"]),
     "csv zero points": (bad_csv("t,a\n", unit="g"), ["m.csv, number of points = 0", "at least 2"]),
-    "csv unit unsaid": (bad_csv("t,a\n0,0.1\n0.01,0.1\n"), ["m.csv, unit = None", 'unit="g"', '"a_g"']),
+    "csv unit missing": (bad_csv("t,a\n0,0.1\n0.01,0.1\n"), ["m.csv, unit = None", 'unit="g"', '"a_g"']),
     "csv unit unknown": (bad_csv("t,a\n", unit="cm/s3"), ["unit = 'cm/s3'", 'did you mean "cm/s2"?']),
     "csv unit contradicts": (bad_csv("t,acc_g\n0,0\n", unit="m/s2"), ["m.csv, unit = 'm/s2'", "acc_g"]),
     "csv velocity in cm": (bad_csv("t,vel_cm_s\n0,0\n", unit="m/s"), ["m.csv, unit = 'cm_s'", "convert"]),
@@ -243,16 +249,19 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Motion], list[str]]] = {
         ["m.csv, column = 'acc_nw'", "did you mean"],
     ),
     "csv column out of range": (bad_csv("t,acc\n0,0\n", unit="g", column=2), ["m.csv, column = 2"]),
-    "csv column is time": (bad_csv("t,acc\n0,0\n", unit="g", column=0), ["m.csv, column = 0", "not time"]),
+    "csv column is time": (
+        bad_csv("t,acc\n0,0\n", unit="g", column=0),
+        ["m.csv, column = 0", "other than time"],
+    ),
     "csv gap in time": (
         bad_csv("t,a\n0.00,0\n0.01,0\n0.02,0\n0.04,0\n0.05,0\n", unit="g"),
-        ["m.csv, line 5, time = 0.04", "0.02 s", "step of 0.01 s", "gap"],
+        ["m.csv, line 5, time = 0.04", "one time step of 0.01 s after 0.02 s", "gap"],
     ),
     "csv time repeats": (
         bad_csv("t,a\n0,0\n.01,0\n.01,0\n.02,0\n.03,0\n", unit="g"),
         ["line 4, time = 0.01"],
     ),
-    "csv time runs back": (
+    "csv time decreases": (
         bad_csv("t,a\n0,0\n.01,0\n.02,0\n.01,0\n.02,0\n", unit="g"),
         ["line 5, time = 0.01"],
     ),
@@ -260,16 +269,16 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Motion], list[str]]] = {
         bad_csv(
             "t,a\n" + "".join(f"{0.01 * k + 0.001 * max(0, k - 50):.4f},0\n" for k in range(100)), unit="g"
         ),
-        ["m.csv, line", "change of step"],
+        ["m.csv, line", "change of time step"],
     ),
-    "csv time stands": (bad_csv("t,a\n1,0\n1,0\n1,0\n", unit="g"), ["m.csv, time step = 0.0", "above 0"]),
+    "csv time constant": (bad_csv("t,a\n1,0\n1,0\n1,0\n", unit="g"), ["m.csv, time step = 0.0", "above 0"]),
     "csv time nan": (bad_csv("t,a\n0,0\nnan,0\n0.02,0\n", unit="g"), ["m.csv, line 3, time = nan", "finite"]),
     "csv time in ms": (bad_csv("t,a\n0,0\n5,0\n10,0\n", unit="g"), ["time step = 5.0", "milliseconds"]),
     "csv gap in values": (bad_csv("t,a\n0,0\n0.01,\n", unit="g"), ["m.csv, line 3, column a = ''", "gap"]),
     "csv nan": (bad_csv("t,a\n0,0\n0.01,nan\n", unit="g"), ["m.csv, line 3", "nan", "finite"]),
     "csv ragged": (bad_csv("t,a\n0,0\n0.01,0,1\n", unit="g"), ["m.csv, line 3 = '0.01,0,1'", "2 columns"]),
     "csv wrong unit": (bad_csv("t,a\n0,0\n0.01,400\n", unit="g"), ["m.csv, line 3", "400.0", "20 g", "m/s2"]),
-    "csv velocity in cm unsaid": (
+    "csv velocity in cm as m": (
         bad_csv("t,v\n0,0\n0.01,34\n", unit="m/s"),
         ["m.csv, line 3", "34.0", "cm/s"],
     ),
@@ -278,18 +287,18 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Motion], list[str]]] = {
 
 @pytest.mark.parametrize("case", BAD_FILES)
 def test_bad_file_is_refused_with_place_value_and_remedy(case: str, tmp_path: Path) -> None:
-    make, told = BAD_FILES[case]
+    make, parts = BAD_FILES[case]
     with pytest.raises(InvalidInput) as refused:
         make(tmp_path)
     message = str(refused.value)
-    for part in told:
+    for part in parts:
         assert part in message
 
 
-def test_files_are_bounded_in_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_size_of_files_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = at2(tmp_path, "t,a\n0,0\n0.01,0\n0.02,0\n", "m.csv")
     monkeypatch.setattr("sandboil.motion._files.MAX_SAMPLES", 2)
-    with pytest.raises(InvalidInput, match=r"m\.csv, line 4 = 3: at most 2 points"):
+    with pytest.raises(InvalidInput, match=r"m\.csv, line 4 = 3: must have at most 2 points"):
         Motion.from_csv(path, unit="g")
     monkeypatch.setattr("sandboil._input_file.MAX_FILE_BYTES", 10)
     with pytest.raises(InvalidInput, match="must not exceed 10 bytes"):
@@ -329,24 +338,27 @@ BAD_ARGUMENTS: dict[str, tuple[Callable[[], object], list[str]]] = {
         lambda: Motion(dt=0.01, acceleration_g=QUIET, kind="within").upgoing_velocity(),
         ["motion.kind = 'within'", "downgoing", "outcrop motion of the same rock"],
     ),
-    "scaled by nothing": (lambda: sine().scaled(), ["exactly one"]),
+    "scaled without value": (lambda: sine().scaled(), ["exactly one"]),
     "scaled by both": (lambda: sine().scaled(pga_g=1.0, factor=1.0), ["exactly one"]),
-    "scaled to nothing": (lambda: sine().scaled(pga_g=0.0), ["above 0", "flipped()"]),
-    "quiet scaled": (lambda: Motion(dt=0.01, velocity=QUIET).scaled(pga_g=0.1), ["zero throughout"]),
+    "scaled to zero": (lambda: sine().scaled(pga_g=0.0), ["above 0", "flipped()"]),
+    "quiet scaled": (
+        lambda: Motion(dt=0.01, velocity=QUIET).scaled(pga_g=0.1),
+        ["all values of the motion are 0"],
+    ),
     "factor nan": (lambda: sine().scaled(factor=math.nan), ["scaled(factor) = nan"]),
     "scaled over 20 g": (lambda: sine().scaled(pga_g=25.0), ["20 g"]),
     "no corner": (lambda: sine().filtered(), ["at least one corner"]),
     "corner zero": (lambda: sine().filtered(low=0.0), ["filtered(low) = 0.0"]),
     "over Nyquist": (lambda: sine().filtered(high=500.0), ["Nyquist", "500 Hz"]),
-    "corners swapped": (lambda: sine().filtered(low=25.0, high=0.1), ["low must be below high"]),
+    "corners exchanged": (lambda: sine().filtered(low=25.0, high=0.1), ["must have low below high"]),
     "damping": (lambda: sine().response_spectrum(damping=5), ["damping = 5", "0.05"]),
-    "periods": (lambda: sine().response_spectrum(periods=[-1.0]), ["periods = [-1.0]", "none negative"]),
+    "periods": (lambda: sine().response_spectrum(periods=[-1.0]), ["periods = [-1.0]", "0 or above"]),
     "spectrum nan": (lambda: response_spectrum([0.0, math.inf], 0.01), ["acceleration_g[1] = inf"]),
     "ricker frequency": (lambda: Motion.ricker(0.0, 0.1), ["ricker.frequency = 0.0"]),
     "ricker pga": (lambda: Motion.ricker(2.0, -0.1), ["ricker.pga_g = -0.1", "flipped()"]),
     "ricker dt": (lambda: Motion.ricker(10.0, 0.1, dt=0.02), ["ricker.dt = 0.02", "0.01 s"]),
     "ricker short": (lambda: Motion.ricker(1.0, 0.1, duration=1.0), ["ricker.duration = 1.0", "3 s"]),
-    "ricker endless": (lambda: Motion.ricker(1.0, 0.1, duration=1e9), ["ricker.duration", "samples"]),
+    "ricker long": (lambda: Motion.ricker(1.0, 0.1, duration=1e9), ["ricker.duration", "samples"]),
     "synthetic pga": (lambda: Motion.synthetic(pga_g=0.0), ["synthetic.pga_g = 0.0"]),
     "synthetic seed": (lambda: Motion.synthetic(seed=-1), ["synthetic.seed = -1"]),
     "synthetic dt": (lambda: Motion.synthetic(dt=0.05), ["synthetic.dt = 0.05", "0.02 s"]),
@@ -361,28 +373,28 @@ BAD_ARGUMENTS: dict[str, tuple[Callable[[], object], list[str]]] = {
 
 @pytest.mark.parametrize("case", BAD_ARGUMENTS)
 def test_bad_argument_is_refused(case: str) -> None:
-    make, told = BAD_ARGUMENTS[case]
+    make, parts = BAD_ARGUMENTS[case]
     with pytest.raises(InvalidInput) as refused:
         make()
-    for part in told:
+    for part in parts:
         assert part in str(refused.value)
 
 
 # Integration, baseline, filter
 
 
-def test_velocity_is_exact_for_an_acceleration_straight_between_samples() -> None:
+def test_velocity_is_exact_for_an_acceleration_linear_between_samples() -> None:
     motion = Motion(dt=0.5, acceleration_g=[0.0, 1.0, 1.0, -1.0])
     np.testing.assert_allclose(motion.velocity, G * np.array([0.0, 0.25, 0.75, 0.75]), rtol=1e-15)
     np.testing.assert_allclose(motion.displacement, G * np.array([0.0, 0.0625, 0.3125, 0.6875]), rtol=1e-15)
 
 
-def test_sine_integrates_to_its_closed_form() -> None:
+def test_the_integral_of_a_sine_is_its_closed_form() -> None:
     omega = 4 * np.pi
     motion = sine()
     velocity = 0.3 * G * np.sin(omega * motion.time) / omega
     displacement = 0.3 * G * (1 - np.cos(omega * motion.time)) / omega**2
-    # The trapezoidal rule lowers a sine by (omega dt)^2/12 = 1.3e-5, twice over for the displacement.
+    # The trapezoidal rule reduces a sine by (omega dt)^2/12 = 1.3e-5, and the displacement by twice as much.
     np.testing.assert_allclose(motion.velocity, velocity, atol=1.4e-5 * velocity.max())
     np.testing.assert_allclose(motion.displacement, displacement, atol=2.8e-5 * displacement.max())
 
@@ -396,14 +408,14 @@ def test_given_velocity_is_kept_and_differentiated() -> None:
     np.testing.assert_allclose(motion.acceleration_g[1:-1], expected[1:-1], atol=3e-5 * expected.max())
 
 
-def test_velocity_at_is_straight_between_samples_and_zero_outside() -> None:
+def test_velocity_at_is_linear_between_samples_and_zero_outside() -> None:
     motion = Motion(dt=0.1, velocity=[0.1, 0.3, 0.2])
     times = np.array([[-0.01, 0.0, 0.05], [0.1, 0.175, 0.21]])
     np.testing.assert_allclose(motion.velocity_at(times), [[0.0, 0.1, 0.2], [0.3, 0.225, 0.0]], rtol=1e-14)
 
 
 @pytest.mark.parametrize("quantity", ["acceleration_g", "velocity"])
-def test_baseline_correction_ends_at_rest_where_it_began(quantity: str) -> None:
+def test_baseline_correction_gives_zero_final_velocity_and_displacement(quantity: str) -> None:
     drifting = sine().acceleration_g + 0.002 + 0.001 * np.linspace(0, 1, 4001) ** 2
     motion = Motion(dt=0.001, acceleration_g=drifting)
     if quantity == "velocity":
@@ -414,7 +426,7 @@ def test_baseline_correction_ends_at_rest_where_it_began(quantity: str) -> None:
     assert corrected.velocity[0] == pytest.approx(0.0, abs=1e-14)
     assert corrected.velocity[-1] == pytest.approx(0.0, abs=1e-12)
     assert corrected.displacement[-1] == pytest.approx(0.0, abs=1e-12)
-    # Eight whole cycles and a slow drift: the sine is left, but for what it gives up to the polynomial.
+    # Eight whole cycles and a slow drift: the sine remains, except its small part in the polynomial.
     rest = corrected.velocity - sine().velocity
     assert np.sqrt(np.mean(rest**2)) < 0.12 * sine().pgv
 
@@ -425,7 +437,7 @@ def test_baseline_of_a_polynomial_drift_is_the_drift() -> None:
     np.testing.assert_allclose(motion.baseline_corrected().acceleration_g, 0.0, atol=1e-11)
 
 
-def test_filter_has_no_delay_and_the_gain_of_two_passes() -> None:
+def test_filter_has_no_delay_and_the_squared_gain_of_one_pass() -> None:
     for frequency, low, high, gain in ((2.0, 0.2, 20.0, 1.0), (2.0, None, 2.0, 0.5), (2.0, 2.0, None, 0.5)):
         motion = sine(frequency, dt=0.005, duration=20.0)
         middle = slice(1500, 2500)
@@ -435,7 +447,7 @@ def test_filter_has_no_delay_and_the_gain_of_two_passes() -> None:
     assert np.max(np.abs(sine(0.5, 0.01, 40.0).filtered(low=5.0).acceleration_g[1500:2500])) < 1e-6
 
 
-def test_filter_sees_rest_around_the_record() -> None:
+def test_filter_assumes_rest_before_and_after_the_record() -> None:
     pulse = np.concatenate([np.full(20, 0.1), np.zeros(180)])
     inside = np.concatenate([np.zeros(5000), pulse, np.zeros(5000)])
     near = Motion(dt=0.01, acceleration_g=pulse).filtered(0.2, 10.0).acceleration_g
@@ -499,7 +511,7 @@ def test_measures_of_a_sine() -> None:
 
 @pytest.mark.parametrize("damping", [0.0, 0.05, 0.3])
 def test_spectrum_of_a_harmonic_base_is_the_closed_form(damping: float) -> None:
-    """Transient and steady response of an oscillator at rest to a cos(w t), which begins with a jump."""
+    """Transient and steady response of an oscillator, initially at rest, to a cos(w t) from t = 0."""
     dt, w, amplitude = 0.001, 2 * np.pi * 1.5, 0.2
     t = np.arange(8001) * dt
     periods = np.array([0.2, 0.5, 0.61, 1.0, 3.0])
@@ -514,12 +526,12 @@ def test_spectrum_of_a_harmonic_base_is_the_closed_form(damping: float) -> None:
         exact.append(omega**2 * np.max(np.abs(u)))
     got = response_spectrum(amplitude * np.cos(w * t), dt, periods, damping)
     assert got.damping == damping
-    # Straight lines for the cosine: (w dt)^2/12 = 7e-6 of the forcing, built up undamped over 12 cycles.
+    # Linear interpolation of the cosine: error (w dt)^2/12 = 7e-6, which accumulates undamped over 12 cycles.
     np.testing.assert_allclose(got.psa_g, exact, rtol=5e-5)
 
 
-def test_spectrum_is_exact_for_coarse_straight_lines() -> None:
-    """A ramp over one step then constant: the oscillator's exact response, looked at on a fine grid."""
+def test_spectrum_is_exact_for_coarse_linear_segments() -> None:
+    """A ramp over one step, then a constant: exact response of the oscillator, evaluated on a fine grid."""
     period, ramp, level = 1.0, 0.25, 0.1
     omega = 2 * np.pi / period
     t = np.linspace(0, 5, 500_001)
@@ -528,17 +540,17 @@ def test_spectrum_is_exact_for_coarse_straight_lines() -> None:
     after = level / ramp * (late - np.sin(omega * late) / omega)
     exact = np.max(np.abs(rising - after))
     got = response_spectrum([0.0] + [level] * 20, ramp, [period], 0.0).psa_g[0]
-    # Twenty looks in a period miss at most 1 - cos(pi/20) of the oscillation about the level.
+    # Twenty values per period underestimate the oscillation about the level by at most 1 - cos(pi/20).
     assert exact * (1 - 0.0062) <= got <= exact * (1 + 1e-12)
 
 
-def test_spectrum_counts_the_free_vibration_after_the_record() -> None:
-    """Impulse of velocity V: a slow undamped oscillator reaches omega V a quarter period later."""
+def test_spectrum_includes_the_free_vibration_after_the_record() -> None:
+    """Impulse of velocity V: a slow undamped oscillator reaches omega V after a quarter of its period."""
     pulse = np.concatenate([[0.0], np.full(9, 0.1), [0.0]])
     period = 10.0
     expected = 2 * np.pi / period * pulse.sum() * 0.001
     assert response_spectrum(pulse, 0.001, [period], 0.0).psa_g[0] == pytest.approx(expected, rel=1e-5)
-    # Damped, the peak is lower by exp(-damping/damped (pi/2 - asin(damping))) and comes a little sooner.
+    # With damping, the peak is reduced by exp(-damping/damped (pi/2 - asin(damping))) and slightly earlier.
     lower = math.exp(-0.2 / math.sqrt(0.96) * math.acos(0.2))
     damped = response_spectrum(pulse, 0.001, [period], 0.2).psa_g[0]
     assert damped == pytest.approx(lower * expected, rel=2e-3)
@@ -549,7 +561,7 @@ def test_spectrum_tends_to_the_peak_acceleration_at_short_periods() -> None:
     spectrum = motion.response_spectrum(periods=[0.0, 1e-6, 1e-4, 0.002, 0.005])
     assert spectrum.psa_g[0] == motion.pga_g
     np.testing.assert_allclose(spectrum.psa_g[1:4], motion.pga_g, rtol=0.01)
-    # At long periods to the displacement: the ground moves under a mass that stays.
+    # At long periods it tends to the displacement: the ground moves and the mass does not.
     long = motion.response_spectrum(periods=[200.0]).psa_g[0] * G / (2 * np.pi / 200) ** 2
     assert long == pytest.approx(np.max(np.abs(motion.displacement)), rel=0.05)
 
@@ -580,14 +592,14 @@ def test_ricker_has_its_peak_frequency_and_comes_to_rest(frequency: float) -> No
     assert motion.pgv == pytest.approx(0.1 * G / (math.sqrt(2 * math.e) * math.pi * frequency), rel=2e-3)
 
 
-def test_ricker_of_a_given_length() -> None:
+def test_ricker_of_a_given_duration() -> None:
     motion = Motion.ricker(2.0, 0.1, dt=0.01, duration=5.0)
     assert (motion.dt, motion.duration) == (0.01, 5.0)
     assert motion.time[np.argmax(motion.acceleration_g)] == pytest.approx(0.75)
 
 
 def test_synthetic_is_like_the_record() -> None:
-    """PGA 0.473 g, PGV 0.339 m/s, D5-95 3.68 s: the figures of RSN765, component 090."""
+    """PGA 0.473 g, PGV 0.339 m/s and D5-95 3.68 s are the values of RSN765, component 090."""
     motion = Motion.synthetic(pga_g=0.47, duration=12.0, seed=1)
     assert motion.pga_g == pytest.approx(0.47, rel=1e-12)
     assert motion.pgv == pytest.approx(0.3387 * 0.47 / 0.4731, rel=1e-3)
@@ -597,7 +609,7 @@ def test_synthetic_is_like_the_record() -> None:
     assert abs(motion.displacement[-1]) < 1e-10
 
 
-def test_synthetic_has_the_band_of_an_earthquake() -> None:
+def test_synthetic_has_the_frequency_band_of_an_earthquake() -> None:
     motion = Motion.synthetic()
     power = np.abs(np.fft.rfft(motion.acceleration_g)) ** 2
     frequency = np.fft.rfftfreq(motion.acceleration_g.size, motion.dt)
@@ -606,7 +618,7 @@ def test_synthetic_has_the_band_of_an_earthquake() -> None:
     assert power[(frequency > 0.5) & (frequency < 12.0)].sum() / power.sum() > 0.8
 
 
-def test_synthetic_depends_on_its_seed_alone() -> None:
+def test_synthetic_depends_only_on_its_seed() -> None:
     motion = Motion.synthetic(seed=3)
     assert motion == Motion.synthetic(seed=3)
     made = (
@@ -628,7 +640,7 @@ def test_synthetic_depends_on_its_seed_alone() -> None:
 )
 @settings(max_examples=20, deadline=None)
 def test_synthetic_meets_its_targets(seed: int, pga_g: float, ratio: float, duration: float) -> None:
-    """Met exactly, or refused with the span that this seed's noise can be brought to."""
+    """A PGV is met exactly, or refused with the range that is possible for this seed."""
     try:
         motion = Motion.synthetic(pga_g, duration, seed, pgv=ratio * pga_g * G)
     except InvalidInput as refused:
@@ -640,7 +652,7 @@ def test_synthetic_meets_its_targets(seed: int, pga_g: float, ratio: float, dura
     assert motion.d5_95 == pytest.approx(3.68 / 12.0 * duration, rel=0.4)
 
 
-def test_synthetic_ground_frequency_and_duration_are_obeyed() -> None:
+def test_synthetic_uses_the_given_ground_frequency_and_duration() -> None:
     soft, stiff = (Motion.synthetic(ground_frequency=f) for f in (1.0, 8.0))
     assert soft.pgv > 2 * stiff.pgv
     short, long = (np.mean([Motion.synthetic(seed=s, d5_95=d).d5_95 for s in range(6)]) for d in (2.0, 6.0))
@@ -658,7 +670,7 @@ def test_record_reads_and_integrates_to_the_velocity_distributed_with_it() -> No
     assert (motion.acceleration_g.size, motion.dt) == (7990, 0.005)
     assert motion.source == {"file": str(RECORD), "kind": "outcrop"}
     assert np.sqrt(np.mean((motion.velocity - other.velocity) ** 2)) < 1e-9
-    # Figures of the record's own header, to the digits it gives.
+    # Values in the header of the record, to the printed digits.
     assert motion.pga_g == pytest.approx(0.4731, abs=6e-5)
     assert motion.pgv == pytest.approx(0.3387, abs=6e-5)
     assert motion.arias == pytest.approx(1.68, abs=6e-3)
@@ -666,7 +678,7 @@ def test_record_reads_and_integrates_to_the_velocity_distributed_with_it() -> No
 
 
 @needs_record
-def test_record_of_the_older_header_form() -> None:
+def test_record_with_the_older_header_format() -> None:
     motion = Motion.from_at2(RECORD.parent / "pacoima_dam_1971_pul164.AT2")
     other = Motion.from_csv(RECORD.parent / "pacoima_dam_1971_pul164.csv")
     assert (motion.acceleration_g.size, motion.dt) == (4164, 0.01)

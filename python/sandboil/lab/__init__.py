@@ -1,8 +1,8 @@
-"""The laboratory: tests on one material point, of a material of ours or of a model of your own.
+"""The laboratory: tests on one material point, with a material of sandboil or with a model of the user.
 
-Stresses are effective, in kPa, compression positive, and strains are fractions, contraction positive, save in
-:func:`strain_path` and :func:`stress_path`, which take and give tensors, tension positive. Shear strain is
-engineering. `docs/laboratory.md` tells what each test does.
+Stresses are effective, in kPa, compression positive; strains are fractions, contraction positive. Exceptions
+are :func:`strain_path` and :func:`stress_path`: their tensors are tension positive. Shear strain is
+engineering strain. `docs/laboratory.md` describes each test.
 """
 
 from . import correlations

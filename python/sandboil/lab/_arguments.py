@@ -1,4 +1,4 @@
-"""The arguments of the tests: their kinds, and the check of all of them before any work is done."""
+"""The arguments of the tests: their types, and the check of all arguments before a test begins."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from ._results import ShearTest
 
 # Largest integrator tolerance at which cycle counts are unbiased (docs/theory/pm4sand.md), as in a scene.
 _TOLERANCE_MAX = 1.0e-4
-# Largest shear or axial strain of a test: beyond it an element is no element any more.
+# Largest shear or axial strain of a test: beyond it the deformation of a specimen has no physical meaning.
 _STRAIN_MAX = 1.0
-# Largest number of cycles: a test of more would take days.
+# Largest number of cycles: a longer test would take days.
 _COUNT_MAX = 10**7
 
 
@@ -27,22 +27,22 @@ def _finite(value: object, dimensions: int, shape: str) -> Floats:
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ValueError(f"must be numbers in {shape}; write them without quotes") from None
+        raise ValueError(f"must be an array of numbers with {shape}; write numbers without quotes") from None
     if array.ndim != dimensions or array.size == 0:
         raise ValueError(f"must have {shape}, not {array.shape}; reshape or transpose it")
     if not np.isfinite(array).all():
-        raise ValueError("must be finite throughout; find out where the others come from")
+        raise ValueError("must have only finite values; remove nan and inf")
     return array
 
 
 def _as_integer(value: object) -> int:
-    """Take any integer (numpy's too), but no truth value: that is a slip."""
+    """Accept any integer, also of numpy, but no bool, which is probably a mistake."""
     try:
         if isinstance(value, (bool, np.bool_)):
             raise TypeError
         return operator.index(cast(Any, value))
     except TypeError:
-        raise ValueError("must be a whole number; write it without a point") from None
+        raise ValueError("must be a whole number; write it without a decimal point") from None
 
 
 def as_series(value: object) -> Floats:
@@ -52,7 +52,7 @@ def as_series(value: object) -> Floats:
 def _as_path(value: object) -> Floats:
     array = _finite(value, 2, "shape (n, 3), n at least 1")
     if array.shape[1] != 3:
-        raise ValueError(f"must have shape (n, 3), not {array.shape}; a row is xx, yy, xy")
+        raise ValueError(f"must have shape (n, 3), not {array.shape}; each row is xx, yy, xy")
     return array
 
 
@@ -80,17 +80,17 @@ def _as_amplitudes(value: object) -> Floats:
 def _as_tested(value: object) -> ShearTest:
     if not isinstance(value, ShearTest) or value.specimen is None:
         raise ValueError(
-            "must be a test of sb.lab.cyclic_dss or sb.lab.monotonic_dss, with its specimen; "
-            "hand over what they give"
+            "must be a result of sb.lab.cyclic_dss or sb.lab.monotonic_dss that still has its specimen; "
+            "pass the result unchanged"
         )
     return value
 
 
 def _as_stress(value: object) -> Floats:
-    array = _finite(value, 1, "3 or 4 components xx, yy, xy and zz")
+    array = _finite(value, 1, "shape (3,) or (4,)")
     if len(array) not in (3, 4):
         raise ValueError(
-            f"must have 3 or 4 components xx, yy, xy and zz, not {len(array)}; tension is positive"
+            f"must have 3 components xx, yy, xy, or 4 with zz, not {len(array)}; tension is positive"
         )
     return _within(array, _specimen.SIGMA_MAX, "stresses are in kPa")
 
@@ -102,7 +102,7 @@ Pressure = Annotated[
         gt=0.0,
         le=_specimen.SIGMA_MAX,
         description="vertical effective stress, kPa, compression positive",
-        json_schema_extra={"remedy": "100 is about one atmosphere, 5 to 10 m of soil under water"},
+        json_schema_extra={"remedy": "100 kPa is about one atmosphere, or 5 to 10 m of soil"},
     ),
 ]
 EarthPressure = Annotated[
@@ -111,7 +111,7 @@ EarthPressure = Annotated[
         gt=0.0,
         le=_specimen.K0_MAX,
         description="horizontal over vertical effective stress",
-        json_schema_extra={"remedy": "0.4 to 1 in most ground"},
+        json_schema_extra={"remedy": "usual values are 0.4 to 1"},
     ),
 ]
 Ratio = Annotated[
@@ -119,7 +119,7 @@ Ratio = Annotated[
     Field(
         gt=0.0,
         description="cyclic shear stress over sigma_v0",
-        json_schema_extra={"remedy": "a ratio, not a stress: 0.05 to 0.5 for sand"},
+        json_schema_extra={"remedy": "it is a ratio, not a stress: 0.05 to 0.5 for sand"},
     ),
 ]
 Bias = Annotated[Number, Field(description="static shear stress over sigma_v0")]
@@ -129,7 +129,7 @@ VoidRatio = (
         Field(
             gt=0.0,
             description="void ratio at the start of the test",
-            json_schema_extra={"remedy": "leave it out for the soil's own"},
+            json_schema_extra={"remedy": "leave it out for the default of the soil"},
         ),
     ]
     | None
@@ -160,8 +160,8 @@ Tolerance = (
         Field(
             gt=0.0,
             le=_TOLERANCE_MAX,
-            description="of the default integrator, relative",
-            json_schema_extra={"remedy": "leave it out for 1e-5; above the range cycle counts are biased"},
+            description="relative error per sub-step of the default integrator",
+            json_schema_extra={"remedy": "leave it out for 1e-5; a larger error biases the number of cycles"},
         ),
     ]
     | None

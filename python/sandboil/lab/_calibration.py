@@ -1,4 +1,4 @@
-"""Calibration of PM4Sand's contraction rate to a cyclic resistance."""
+"""Calibration of the contraction rate of PM4Sand to a cyclic resistance."""
 
 from __future__ import annotations
 
@@ -36,74 +36,85 @@ Target = Annotated[
     Field(
         gt=0.0,
         description="cyclic resistance ratio",
-        json_schema_extra={"remedy": "0.05 to 0.6; sb.lab.correlations has it from SPT and CPT"},
+        json_schema_extra={
+            "remedy": "usual values are 0.05 to 0.6; sb.lab.correlations estimates it from SPT or CPT"
+        },
     ),
 ]
 
-# Contraction rates between which the answer is looked for: beyond, sand does not contract, or only that.
+# Range of contraction rates that is searched. Below it sand contracts too fast, above it hardly at all.
 _HPO_RANGE = (1e-3, 50.0)
-# Factor by which the first guess is moved until it brackets the answer; the guess is good to 1.5.
+# Factor between the trials that bracket the solution; the first guess is within a factor of about 1.5.
 _BRACKETING = 1.5
-# Resistances are met to this, relatively, or the user is warned. A count by halves is no smooth function of
-# the stress ratio: it goes up and down by a half within a per cent.
+# Relative tolerance on the resistance, beyond which the user is warned. Cycles are counted by halves, so the
+# count is not a smooth function of the stress ratio: it varies by a half within one per cent.
 _MET = 0.01
-# Steps in which the resistance of the answer is looked for beside the target, relatively.
+# Relative step of the search for the resistance of the calibrated sand, which starts at the target.
 _STEP = 0.0025
 
 
 class CalibrationWarning(SandboilWarning):
-    """The target of a calibration cannot be met; the nearest sand was returned."""
+    """The target of a calibration was not met; the closest sand was returned."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """A calibrated sand, with what was asked for and what it does."""
+    """A calibrated sand, the target, and the resistance that was achieved."""
 
     soil: PM4Sand
     target: float
-    """Cyclic resistance ratio asked for."""
+    """Required cyclic resistance ratio."""
     achieved: float
-    """Cyclic resistance ratio of `soil` in the same cycles; nan where it has none."""
+    """Cyclic resistance ratio of `soil` in `cycles`; nan if it has none in the searched range."""
     cycles: float
+    """Number of uniform cycles."""
     criterion: dict[str, float]
+    """The criterion by name and level, as arguments of :meth:`CyclicTest.cycles_to`."""
     conditions: Conditions = field(repr=False)
 
     @property
     def met(self) -> bool:
-        """Whether the target was met."""
+        """Whether the target was met within 1 %."""
         return abs(self.achieved - self.target) <= _MET * self.target
 
     def curve(self) -> ResistanceCurve:
-        """CSR against cycles of the calibrated sand, three criteria."""
+        """CSR against cycles of the calibrated sand for three criteria; see :func:`crr_curve`."""
         return crr_curve(self.soil, **self.conditions.arguments())
 
     def plot(self) -> Figure:
-        """The calibrated sand's curves with the target marked."""
+        """Plot :meth:`curve` and the target; a matplotlib figure."""
         from ._resistance_plots import resistance
 
         return resistance(self.curve(), target=(self.cycles, self.target))
 
 
 def _first_guess(density: float, resistance: float) -> float:
-    """Contraction rate after the model's authors (Boulanger and Ziotopoulou 2017), where that has a value."""
+    """Contraction rate by the formula of Boulanger and Ziotopoulou (2017), or 0.5 outside its range."""
     denominator = 1.0 - resistance * (12.0 - 12.5 * density)
     guess = resistance * (2.05 - 2.4 * density) / denominator if denominator > 0.0 else math.nan
     return guess if _HPO_RANGE[0] < guess < _HPO_RANGE[1] else 0.5
 
 
 def calibration(Dr: float, G0: float, crr: float, **options: Any) -> Calibration:
-    """Contraction rate `hpo` for which the cyclic resistance ratio in so many cycles is `crr`.
+    """Find the contraction rate `hpo` for which the cyclic resistance ratio in `cycles` cycles is `crr`.
 
     Parameters
     ----------
-    Dr, G0 : of :class:`PM4Sand`, as are all further keywords that are parameters of it
-    crr : cyclic resistance ratio, by undrained cyclic direct simple shear
-    cycles : uniform cycles in which `crr` meets the criterion; 15
-    gamma_sa, gamma_da, r_u : the criterion, one of them; 3 % single-amplitude shear strain
+    Dr, G0 : relative density (fraction) and shear modulus coefficient of :class:`PM4Sand`; all other
+        parameters of :class:`PM4Sand` may be given as keywords
+    crr : target: cyclic resistance ratio in undrained cyclic direct simple shear
+    cycles : number of uniform cycles to the criterion; default 15
+    gamma_sa, gamma_da, r_u : the criterion, at most one of them, as for :func:`crr`; default 3 %
+        single-amplitude shear strain
     sigma_v0, K0, static_shear_ratio, void_ratio, integrator : as for :func:`cyclic_dss`
 
-    Warns with :class:`CalibrationWarning`, and returns the nearest sand, where no contraction rate meets the
-    target. Raises :class:`InvalidInput`.
+    Warns
+    -----
+    CalibrationWarning : no contraction rate meets the target; the closest sand is returned
+
+    Raises
+    ------
+    InvalidInput : an unknown keyword, a value out of range, or an initial stress that the soil cannot carry
     """
     unknown = options.keys() - _OPTIONS - PM4Sand.model_fields.keys()
     if unknown or "hpo" in options:
@@ -113,7 +124,7 @@ def calibration(Dr: float, G0: float, crr: float, **options: Any) -> Calibration
         raise InvalidInput(
             f"lab.calibration.{name}",
             options[name],
-            "is what the calibration finds"
+            "is the result of the calibration, not an input"
             if name == "hpo"
             else f"unknown key, known are {', '.join(known)}",
             "leave it out" if name == "hpo" or nearest is None else f"did you mean {nearest!r}?",
@@ -124,7 +135,7 @@ def calibration(Dr: float, G0: float, crr: float, **options: Any) -> Calibration
 
 
 def calibrate_hpo(Dr: float, G0: float, crr: float, **options: Any) -> PM4Sand:
-    """The sand of :func:`calibration`, with the same arguments, warnings and errors."""
+    """The calibrated sand of :func:`calibration`; same arguments, warnings and errors."""
     return calibration(Dr, G0, crr, **options).soil
 
 
@@ -162,17 +173,17 @@ def _calibrate(
         achieved = resistance(soil, cycles, criterion, conditions)
     result = Calibration(soil, crr, achieved, cycles, criterion, conditions)
     if not result.met:
-        reached = "no resistance at all" if math.isnan(achieved) else f"{achieved:.4g}"
+        reached = "no cyclic resistance" if math.isnan(achieved) else f"{achieved:.4g}"
         reason = (
             f"cannot be met by any contraction rate between {_HPO_RANGE[0]:g} and {_HPO_RANGE[1]:g}"
             if found is None
-            else f"is not met within {100.0 * _MET:g} %, since resistance jumps with the contraction rate"
+            else f"is not met within {100.0 * _MET:g} %, because resistance jumps with the contraction rate"
         )
         warnings.warn(
             f"crr = {crr:g} in {cycles:g} cycles {reason} at Dr = {Dr:g}, G0 = {G0:g}: hpo = {soil.hpo:g} "
             f"gives {reached}",
             CalibrationWarning,
-            # The frames between here and the caller of `calibration`.
+            # Attribute the warning to the caller of `calibration`.
             stacklevel=4,
         )
     return result
@@ -180,7 +191,8 @@ def _calibrate(
 
 _calibrate.__name__ = "calibration"
 _calibrated = checked(_calibrate)
-# Keywords of `calibration` that are no parameters of the sand, and parameters that are no keywords of it.
+# Keywords of `calibration` that are not parameters of the sand; and parameters of the sand that are not
+# keywords.
 _OPTIONS = {
     name
     for name, parameter in inspect.signature(_calibrate).parameters.items()

@@ -1,4 +1,4 @@
-"""The simple shear test of Mhaski and Ramana (2025), section 6.1, as a cell of particles."""
+"""The simple shear test of Mhaski and Ramana (2025), section 6.1, on a block of particles."""
 
 from __future__ import annotations
 
@@ -30,26 +30,28 @@ from ._arguments import (
     checked,
 )
 from ._results import CyclicTest, Table
-from ._shear import STRAIN_RESOLUTION, STRESS_RESOLUTION, check_reach, limit_told, shear_columns
+from ._shear import STRAIN_RESOLUTION, STRESS_RESOLUTION, check_reach, shear_columns, strain_limit_message
 from ._specimen import consolidated
 
-# Fewest nodes along a side of the free centre: with one there is no field whose freedom could show.
+# Smallest number of nodes along a side of the free centre. With one node, departure from homogeneous shear
+# could not be measured.
 _FEWEST_FREE = 2
-# Kernel supports between a free node and the first node missing outside: no stencil that it feels is cut.
+# Distance of a free node from the edge of the block in kernel supports: every stencil that acts on it is
+# complete.
 _SUPPORTS = 2.0
 # Support of the kernel over the smoothing length.
 _SUPPORT = 2.0
 # Round-off allowed where a length must be a multiple of the spacing.
 _ROUND_OFF = 1e-6
 
-# Beyond a shear strain of 0.2 the weights of the undeformed lattice would have to be renewed.
+# The weights are those of the undeformed lattice, which is no longer accurate beyond a shear strain of 0.2.
 CellLimit = Annotated[Limit, Field(le=0.2)]
 Length = Annotated[Number, Field(gt=0.0, description="m")]
 Density = Annotated[
     Number,
     Field(gt=0.0, description="Mg/m3", json_schema_extra={"remedy": "2000 kg/m3 is written 2.0"}),
 ]
-# As far as it was tried.
+# The largest value that was tested.
 StrainStep = Annotated[Number, Field(gt=0.0, le=1e-3, description="shear strain")]
 Inertia = Annotated[Number, Field(gt=0.0, le=1.0, description="share of the confining stress")]
 Damping = Annotated[Number, Field(ge=0.0, lt=1.0)]
@@ -60,22 +62,22 @@ Threads = Annotated[int, Field(strict=True, ge=1, le=MAX_THREADS)]
 
 @dataclass(frozen=True)
 class CellReport:
-    """What a test cost, and how far its centre was from homogeneous shear at the worst moment.
+    """Cost of a test, and the largest departure of its centre from homogeneous shear.
 
     Attributes
     ----------
-    steps : time steps
-    time_step : the last one, s
-    wall_time : s
-    stress_nodes : of the block
-    computed_stress_nodes : those whose soil was computed: all that a free node feels
-    gamma_spread : standard deviation of the shear strain over the centre
-    tau_spread, sigma_v_spread : of the stresses, kPa
-    volume_strain : root mean square of the volumetric strain over the centre; zero if exactly undrained
-    velocity_deviation : root mean square departure of the free nodes from Eq. 17, over the largest speed of
-        the centre's edge
-    overshoot : largest stress beyond the target, over the target; negative if it was never reached
-    counters : work done, by kind
+    steps : number of time steps
+    time_step : the last time step, s
+    wall_time : computing time, s
+    stress_nodes : number of stress nodes of the block
+    computed_stress_nodes : number of stress nodes whose soil was computed: all that act on a free node
+    gamma_spread : standard deviation of the shear strain over the centre, 1
+    tau_spread, sigma_v_spread : standard deviations of shear and vertical stress over the centre, kPa
+    volume_strain : root mean square of the volumetric strain over the centre, 1; zero if exactly undrained
+    velocity_deviation : root mean square deviation of the velocities of the free nodes from Eq. 17, over the
+        largest speed at the edge of the centre
+    overshoot : (largest shear stress - target)/target; negative if the target was never reached
+    counters : counts of operations, by name
     """
 
     steps: int
@@ -94,14 +96,14 @@ class CellReport:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CellNodes(Table):
-    """The block at the end of a test: a row for each of its n nodes, row by row from the bottom.
+    """The nodes of the block at the end of a test, in rows from the bottom.
 
     Attributes
     ----------
-    position, velocity : (n, 2), m and m/s, in the frame of the block's centre
-    gamma, tau, sigma_v_eff, sigma_h_eff, r_u : (n,), as the record's; means over a node's stress nodes, NaN
-        where no soil was computed
-    free : (n,), whether it moves freely
+    position, velocity : (n, 2), m and m/s, relative to the centre of the block
+    gamma, tau, sigma_v_eff, sigma_h_eff, r_u : (n,), as in :class:`CyclicTest`; means over the stress nodes
+        of a node, nan where no soil was computed
+    free : (n,), whether the node moves freely
     """
 
     position: Floats
@@ -114,7 +116,7 @@ class CellNodes(Table):
     free: NDArray[np.bool_]
 
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Every column by its name, vectors by components."""
+        """Every column by its name; a vector has one column for each component."""
         return {
             **dict(zip(("x", "y"), self.position.T, strict=True)),
             **dict(zip(("v_x", "v_y"), self.velocity.T, strict=True)),
@@ -129,8 +131,8 @@ class ShearCell(CyclicTest):
 
     Attributes
     ----------
-    nodes : the block at the end
-    report : cost, and departure from homogeneous shear
+    nodes : nodes of the block at the end
+    report : cost of the test and departure from homogeneous shear
     """
 
     nodes: CellNodes
@@ -162,33 +164,34 @@ def shear_cell(
     progress: Callable[[float, float], None] | None = None,
     threads: Threads = 1,
 ) -> ShearCell:
-    """Constant-volume cyclic simple shear of a block whose centre moves freely.
+    """Constant-volume cyclic simple shear of a block of particles with a freely moving centre.
 
-    The test of Mhaski and Ramana (2025), section 6.1. The nodes around the centre move as Eq. 17 says,
-    v_x = v_x0 y / H, seen from the block's centre. The direction reverses when the mean shear stress of the
-    centre reaches `csr * sigma_v0`. The strain rate changes so slowly that inertia takes no more than the
-    share `inertia` of the confining stress, so that no velocity is ever reset.
+    The test of Mhaski and Ramana (2025), section 6.1. The nodes around the centre have prescribed velocities
+    by Eq. 17, v_x = v_x0 y / H, relative to the centre of the block. The direction reverses when the mean
+    shear stress of the centre reaches `csr * sigma_v0`. The strain rate changes gradually, so that the shear
+    stress due to inertia is at most `inertia` times the mean confining stress. Velocities are never reset.
 
     Parameters
     ----------
-    soil : a material; a model of your own runs in :func:`cyclic_dss` alone
-    sigma_v0, K0, csr, void_ratio, max_cycles, integrator, tolerance : as of :func:`cyclic_dss`
+    soil : a material of sandboil; models written by the user (:class:`SoilModel`) are not possible here
+    sigma_v0, K0, csr, void_ratio, max_cycles, integrator, tolerance : as for :func:`cyclic_dss`
     gamma_stop : shear strain at which the test ends, at most 0.2
-    spacing, size, free_size : particle spacing, side of the block and of its free centre, m
-    density : of the soil, Mg/m3; scales nothing but inertia
-    strain_step : largest shear strain of a step
-    inertia : largest shear stress that the centre's inertia may take, over the mean confining stress
+    spacing, size, free_size : particle spacing, side of the block and side of its free centre, m
+    density : total density of the soil, Mg/m3; it affects inertia only
+    strain_step : largest shear strain of a time step
+    inertia : largest shear stress due to inertia of the centre, over the mean confining stress
     local_damping : coefficient of Eq. 16
-    velocity_filter : strength of the velocity filter, which vanishes where shear is homogeneous
+    velocity_filter : strength of the velocity filter, which has no effect on homogeneous shear
     smoothing_ratio : smoothing length over spacing
-    every_stress_node : compute also the soil that no free node feels; changes no result
-    progress : called about ten times a second with the cycles made and the present shear strain
-    threads : that share the work; results are the same bits for any number
+    every_stress_node : compute also the soil at stress nodes that do not act on a free node; the results are
+        the same
+    progress : called about ten times a second with the number of cycles so far and the present shear strain
+    threads : number of threads; results are identical to the bit for any number
 
     Raises
     ------
-    InvalidInput : an argument that has no sense, a start that the soil cannot carry, or a shear stress that
-        it can never reach
+    InvalidInput : an invalid argument, an initial stress that the soil cannot carry, or a shear stress that
+        it cannot reach
     """
     where = "lab.shear_cell"
     specimen = consolidated(
@@ -248,8 +251,8 @@ def shear_cell(
     record, counters = core.record(), core.counters()
     nodes = _nodes(core, sigma_v0)
     turns = record["turns"]
-    finished = f"max_cycles = {max_cycles} were done"
-    ended = finished if turns[-1] == 2 * max_cycles else limit_told(gamma_stop, turns)
+    finished = f"max_cycles = {max_cycles} was reached"
+    ended = finished if turns[-1] == 2 * max_cycles else strain_limit_message(gamma_stop, turns)
     return ShearCell(
         **shear_columns(record),
         cycle=record["cycle"],
@@ -286,7 +289,7 @@ def _nodes(core: _core.ShearCell, sigma_v0: float) -> CellNodes:
 
 
 def _check_lattice(where: str, spacing: float, size: float, free_size: float, smoothing_ratio: float) -> None:
-    """Refuse a block that the spacing does not divide or that has no room around its centre."""
+    """Refuse sides that are not multiples of the spacing, and a block that is too small around its centre."""
     counts = []
     for name, length in (("size", size), ("free_size", free_size)):
         count = length / spacing
@@ -301,10 +304,10 @@ def _check_lattice(where: str, spacing: float, size: float, free_size: float, sm
         raise InvalidInput(
             f"{where}.free_size",
             free_size,
-            f"must be at least {_FEWEST_FREE} spacings",
-            "take a smaller spacing",
+            f"must be at least {_FEWEST_FREE} times the spacing",
+            "use a smaller spacing",
         )
-    # From the outermost free node to the first one missing outside, in spacings.
+    # Distance from the outermost free node to the first position outside the block, in spacings.
     room = 0.5 * (across - free) + 1.0
     needed = _SUPPORTS * _SUPPORT * smoothing_ratio
     if (across - free) % 2 or room < needed:

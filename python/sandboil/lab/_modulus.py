@@ -1,4 +1,4 @@
-"""Shear modulus and damping over the amplitude of strain."""
+"""Shear modulus and damping as functions of the strain amplitude."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ._results import ModulusReduction
 from ._shear import STRAIN_STEP, sheared
 from ._specimen import consolidated
 
-# Increments and rows from the middle of a loop to its end, at least: the area of the loop is known to 1e-4.
+# Smallest number of increments, and of rows, per amplitude of strain: the area of a loop is accurate to 1e-4.
 _STEPS = 100
 _AMPLITUDES = tuple(np.logspace(-6.0, -2.0, 17).tolist())
 
@@ -42,14 +42,20 @@ def modulus_reduction(
     integrator: Integrator = "default",
     tolerance: Tolerance = None,
 ) -> ModulusReduction:
-    """Secant shear modulus and damping ratio of the last of some cycles of shear strain, per amplitude.
+    """Secant shear modulus and damping ratio in cyclic simple shear, for several strain amplitudes.
 
     Parameters
     ----------
-    strains : amplitudes of the engineering shear strain, shape (n,), positive; each has a specimen of its own
-    cycles : cycles at each amplitude; the loop of the last one counts
-    drained : hold the vertical effective stress, as curves from resonant column and torsional shear mean it
-    soil, sigma_v0, K0, void_ratio, integrator, tolerance : as of :func:`cyclic_dss`
+    strains : amplitudes of the engineering shear strain, 1, shape (n,), positive; each is tested on a new
+        specimen
+    cycles : number of cycles at each amplitude; modulus and damping are those of the last cycle
+    drained : True: constant vertical effective stress, as in resonant column and torsional shear tests.
+        False: constant volume
+    soil, sigma_v0, K0, void_ratio, integrator, tolerance : as for :func:`cyclic_dss`
+
+    Raises
+    ------
+    InvalidInput : an invalid argument, or an initial stress that the soil cannot carry
     """
     amplitudes = np.asarray(strains, dtype=np.float64)
     found: list[tuple[float, float]] = []
@@ -91,7 +97,7 @@ def modulus_reduction(
 
 
 def _of_last_loop(record: dict[str, NDArray[Any]]) -> tuple[float, float]:
-    """Secant modulus, kPa, and damping ratio: the energy lost over 4 pi times that stored (Kramer 1996)."""
+    """Secant modulus, kPa, and damping ratio: energy loss over 4 pi times stored energy (Kramer 1996)."""
     begin, back, end = np.flatnonzero(np.diff(record["turns"], prepend=0))[-3:]
     gamma, tau = record["strain"][:, 2], record["stress"][:, 2]
     modulus = (tau[end] - tau[back]) / (gamma[end] - gamma[back])

@@ -1,4 +1,4 @@
-"""Tests along a path that is given: of strain, of stress, of compression, and back to the first stress."""
+"""Tests along a given path: strain path, stress path, plane-strain compression and reconsolidation."""
 
 from __future__ import annotations
 
@@ -39,19 +39,20 @@ def strain_path(
     integrator: Integrator = "default",
     tolerance: Tolerance = None,
 ) -> PathTest:
-    """Lead a specimen through given strains, straight between rows. Tension positive throughout.
+    """Test along a given strain path. Stress and strain are tension positive.
 
     Parameters
     ----------
-    soil : a material, or a model of your own (:class:`SoilModel`)
-    stress0 : effective stress xx, yy, xy, and zz if it is not that of xx, kPa, at zero strain
-    strain : xx, yy and engineering xy at the end of each leg, shape (n, 3), the first from zero strain
-    void_ratio : at the start; default the soil's own
-    integrator, tolerance : as of :func:`cyclic_dss`
+    soil : a material, or a model written by the user (:class:`SoilModel`)
+    stress0 : effective stress at zero strain, kPa, shape (3,) or (4,): xx, yy, xy and zz; default of zz is xx
+    strain : shape (n, 3): xx, yy and engineering xy, 1, at the end of each leg. The path is linear between
+        rows and begins at zero strain
+    void_ratio : initial void ratio; default that of the soil
+    integrator, tolerance : as for :func:`cyclic_dss`
 
     Raises
     ------
-    InvalidInput : an argument that has no sense, or a first stress that the soil cannot carry
+    InvalidInput : an invalid argument, or an initial stress that the soil cannot carry
     """
     specimen = under_stress("lab.strain_path", soil, stress0, void_ratio, integrator, tolerance)
     return _path_test(specimen, np.asarray(strain, dtype=np.float64), by_stress=False)
@@ -67,9 +68,19 @@ def stress_path(
     integrator: Integrator = "default",
     tolerance: Tolerance = None,
 ) -> PathTest:
-    """Lead a specimen through given effective stresses, shape (n, 3), kPa; else as :func:`strain_path`.
+    """Test along a given effective stress path. Stress and strain are tension positive.
 
-    Where the soil cannot carry a stress the test ends there, incomplete.
+    If the soil cannot carry a stress, the test ends there and is incomplete.
+
+    Parameters
+    ----------
+    stress : shape (n, 3): xx, yy and xy, kPa, at the end of each leg. The path is linear between rows and
+        begins at `stress0`
+    soil, stress0, void_ratio, integrator, tolerance : as for :func:`strain_path`
+
+    Raises
+    ------
+    InvalidInput : an invalid argument, or an initial stress that the soil cannot carry
     """
     specimen = under_stress("lab.stress_path", soil, stress0, void_ratio, integrator, tolerance)
     return _path_test(specimen, np.asarray(stress, dtype=np.float64), by_stress=True)
@@ -87,12 +98,17 @@ def plane_strain_compression(
     integrator: Integrator = "default",
     tolerance: Tolerance = None,
 ) -> CompressionTest:
-    """Compression from above in plane strain, the lateral stress held (drained) or the volume (undrained).
+    """Vertical compression in plane strain.
 
     Parameters
     ----------
+    drained : True: constant lateral effective stress. False: constant volume (undrained)
     axial_strain_max : vertical strain at the end, 1, compression positive
-    soil, sigma_v0, K0, void_ratio, integrator, tolerance : as of :func:`cyclic_dss`
+    soil, sigma_v0, K0, void_ratio, integrator, tolerance : as for :func:`cyclic_dss`
+
+    Raises
+    ------
+    InvalidInput : an invalid argument, or an initial stress that the soil cannot carry
     """
     specimen = consolidated(
         "lab.plane_strain_compression",
@@ -105,7 +121,7 @@ def plane_strain_compression(
         tolerance=tolerance,
     )
     end = (-K0 * sigma_v0 if drained else axial_strain_max, -axial_strain_max, 0.0)
-    record, ending = _led(
+    record, ending = _along_path(
         specimen, np.array([end]), (drained, False, False), STRESS_RESOLUTION * sigma_v0, STRAIN_RESOLUTION
     )
     strain, stress = record["strain"], record["stress"]
@@ -122,18 +138,18 @@ def plane_strain_compression(
 
 @checked
 def reconsolidation(test: Tested, *, post_shaking: StrictBool = True) -> Reconsolidation:
-    """Go on with the specimen of an undrained shear test: let its pore pressure dissipate.
+    """Dissipation of the excess pore pressure after an undrained shear test.
 
-    First the shear stress goes back, undrained, to what it was before the test; it is held from there on.
-    Then the vertical effective stress goes back to `sigma_v0` without lateral strain. The test itself stays
-    as it is.
+    First the shear stress returns, undrained, to its value before the test, and is then constant. Then the
+    vertical effective stress returns to `sigma_v0` without lateral strain. The test uses a copy of the
+    specimen, so `test` is unchanged.
 
     Parameters
     ----------
-    test : of :func:`cyclic_dss` or :func:`monotonic_dss`
-    post_shaking : let the model soften as soil does that settles out of suspension; for PM4Sand the factor
-        F_sed on its elastic moduli (Boulanger and Ziotopoulou 2017), without which it contracts
-        a fraction of what sands do. Models without such a state make no difference.
+    test : result of :func:`cyclic_dss` or :func:`monotonic_dss`
+    post_shaking : use the reduced stiffness of sand that settles after liquefaction: for PM4Sand the factor
+        F_sed on its elastic moduli (Boulanger and Ziotopoulou 2017). Without it the model contracts much less
+        than sand does. No effect on the other models
 
     Raises
     ------
@@ -143,10 +159,12 @@ def reconsolidation(test: Tested, *, post_shaking: StrictBool = True) -> Reconso
     specimen, shear_stress = test.specimen.copy(), float(test.tau[0])
     released, ending = sheared(specimen, [("stress", shear_stress)], drained=False, sigma_v0=test.sigma_v0)
     if ending != "complete":
-        return _reconsolidation(test, released, f"the shear stress did not come back: {ending}", False)
+        return _reconsolidation(
+            test, released, f"the shear stress did not return to its initial value: {ending}", False
+        )
     if post_shaking:
         specimen.reconsolidate()
-    record, ending = _led(
+    record, ending = _along_path(
         specimen,
         np.array([(specimen.strain[0], -test.sigma_v0, shear_stress)]),
         (False, True, True),
@@ -168,8 +186,8 @@ def _reconsolidation(
 
 
 def _path_test(specimen: _core.Specimen, rows: Floats, *, by_stress: bool) -> PathTest:
-    # Rows where they were asked for, and none between.
-    record, ending = _led(specimen, rows, (by_stress,) * 3, np.inf, np.inf)
+    # Infinite resolutions: record the ends of the legs only.
+    record, ending = _along_path(specimen, rows, (by_stress,) * 3, np.inf, np.inf)
     strain, stress, void_ratio = (record[name][1:] for name in ("strain", "stress", "void_ratio"))
     complete = ending == "complete"
     return PathTest(
@@ -178,18 +196,20 @@ def _path_test(specimen: _core.Specimen, rows: Floats, *, by_stress: bool) -> Pa
         stress_zz=stress[:, 3],
         void_ratio=void_ratio,
         complete=complete,
-        ended="the whole path was made" if complete else f"in leg {len(strain)} of {len(rows)}: {ending}",
+        ended="the end of the path was reached"
+        if complete
+        else f"in leg {len(strain)} of {len(rows)}: {ending}",
     )
 
 
-def _led(
+def _along_path(
     specimen: _core.Specimen,
     rows: Floats,
     by_stress: tuple[bool, bool, bool],
     stress_resolution: float,
     strain_resolution: float,
 ) -> tuple[dict[str, NDArray[Any]], str]:
-    """The core's record of a path, and how it ended."""
+    """Record of a path as the core returns it (tension positive), and why the test ended."""
     return specimen.path(
         rows,
         by_stress=by_stress,

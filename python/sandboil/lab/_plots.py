@@ -1,4 +1,4 @@
-"""Pictures of the tests."""
+"""Plots of the tests."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from ._results import (
     ShearTest,
 )
 
-# End of an axis over its largest value.
+# Length of an axis over its largest value.
 _MARGIN = 1.05
-# Each quantity: its label, and the factor from the record to the paper.
+# Label of each quantity, and the factor from the record to the plot.
 _QUANTITIES = {
     "gamma": ("shear strain, %", 100.0),
     "tau": ("shear stress, kPa", 1.0),
@@ -37,7 +37,7 @@ _QUANTITIES = {
     "damping": ("damping ratio, %", 100.0),
     "axial_strain": ("vertical strain, %", 100.0),
     "p": ("mean effective stress in the plane, kPa", 1.0),
-    "q": ("vertical less horizontal stress, kPa", 1.0),
+    "q": ("vertical minus horizontal stress, kPa", 1.0),
     "excess_pore_pressure": ("excess pore pressure, kPa", 1.0),
     "gamma_xy": ("shear strain xy, %", 100.0),
     "tau_xy": ("shear stress xy, kPa", 1.0),
@@ -58,7 +58,7 @@ def cyclic(test: CyclicTest, reference: object | None) -> Figure:
 
 
 def monotonic(test: ShearTest, reference: object | None) -> Figure:
-    """Stress-strain curve, stress path, and pore pressure (drained: contraction) over strain."""
+    """Stress-strain curve, stress path, and pore pressure (drained: contraction) against strain."""
     panels = [
         ("gamma", "tau"),
         ("sigma_v_eff", "tau"),
@@ -68,7 +68,7 @@ def monotonic(test: ShearTest, reference: object | None) -> Figure:
 
 
 def modulus(test: ModulusReduction, reference: object | None) -> Figure:
-    """Modulus ratio and damping ratio over strain."""
+    """Modulus ratio and damping ratio against strain."""
     figure = _drawn(test, reference, [("gamma", "G_ratio"), ("gamma", "damping")], (1, 2))
     for axes in figure.axes:
         axes.set_xscale("log")
@@ -78,7 +78,7 @@ def modulus(test: ModulusReduction, reference: object | None) -> Figure:
 
 
 def compression(test: CompressionTest, reference: object | None) -> Figure:
-    """Stress-strain curve, stress path, and pore pressure (drained: contraction) over strain."""
+    """Stress-strain curve, stress path, and pore pressure (drained: contraction) against strain."""
     panels = [
         ("axial_strain", "q"),
         ("p", "q"),
@@ -88,12 +88,12 @@ def compression(test: CompressionTest, reference: object | None) -> Figure:
 
 
 def reconsolidation(test: Reconsolidation, reference: object | None) -> Figure:
-    """Vertical effective stress over contraction, and the shear stress and strain that go with it."""
+    """Vertical effective stress against contraction, and shear stress against vertical effective stress."""
     return _drawn(test, reference, [("eps_v", "sigma_v_eff"), ("sigma_v_eff", "tau")], (1, 2))
 
 
 def path(test: PathTest, reference: object | None) -> Figure:
-    """Shear stress over shear strain and over mean stress, and mean stress over volume."""
+    """Shear stress against shear strain and against mean stress, and mean stress against volume."""
     panels = [("gamma_xy", "tau_xy"), ("mean", "tau_xy"), ("volume", "mean")]
     return _drawn(test, reference, panels, (1, 3))
 
@@ -117,15 +117,15 @@ def _drawn(
     return figure
 
 
-def _draw(axes: Axes, source: object, names: tuple[str, str], look: dict[str, Any]) -> None:
+def _draw(axes: Axes, source: object, names: tuple[str, str], style: dict[str, Any]) -> None:
     x, y = (_QUANTITIES[name][1] * _values(source, name) for name in names)
-    axes.plot(x, y, **look)
+    axes.plot(x, y, **style)
 
 
 def _values(source: object, name: str) -> Floats:
-    """An array by its name from a test, or from anything that has it as an attribute or under a key."""
+    """The array `name` of a test, or of any object that has it as an attribute or key."""
     try:
         value = source[name] if isinstance(source, Mapping) else getattr(source, name)
     except (AttributeError, KeyError):
-        raise InvalidInput("reference", source, f"must have {name}, an array") from None
+        raise InvalidInput("reference", source, f"must have the array {name} as attribute or key") from None
     return np.asarray(value, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Cyclic resistance: the stress ratio that a criterion wants in a number of cycles, and its curves."""
+"""Cyclic resistance: the stress ratio that meets a criterion in a number of cycles, and curves of it."""
 
 from __future__ import annotations
 
@@ -43,28 +43,30 @@ CRITERIA: dict[str, dict[str, float]] = {
 }
 """The three usual criteria of liquefaction in a cyclic test, as arguments of `CyclicTest.cycles_to`."""
 
-# Cyclic stress ratios between which a resistance is looked for; ground has none beyond.
+# Range of cyclic stress ratios that is searched; the resistance of soil lies inside.
 _CSR_RANGE = (0.005, 3.0)
-# First guess and the factor by which it is moved until it brackets the answer.
+# First guess, and the factor between the trials that bracket the solution.
 _CSR_GUESS, _BRACKETING = 0.15, 1.4
-# Relative width at which a bisection ends: far below what resistances are known to.
+# Relative width at which a bisection ends, far below the uncertainty of a resistance.
 _WIDTH = 2e-4
-# Strain at which a test for a pore pressure ratio or a double amplitude ends: liquefied sand has come so far.
+# Strain at which a test for a pore pressure ratio or a double amplitude ends. Sand that strains so far is
+# liquefied.
 _GAMMA_STOP = 0.06
-# A cycle count by halves takes the first stroke, a quarter of a cycle in time, for a half.
+# If cycles are counted by halves, the first stroke counts as half a cycle. `CyclicTest.cycle` counts it as a
+# quarter.
 _FIRST_STROKE = 0.25
 # Cyclic stress ratios of an automatic curve, as fractions of the resistance in 15 cycles.
 _CURVE_FRACTIONS = (0.75, 0.82, 0.9, 1.0, 1.1, 1.25, 1.45, 1.7)
-# Cycles at which a point of a curve is given up.
+# Default largest number of cycles for a point of a curve.
 _CURVE_CYCLES = 500
-# Largest number of cycles of a resistance: no ground is shaken so long.
+# Largest number of cycles for a resistance, more than in any earthquake.
 _CYCLES_MAX = 1e4
 
 
 def _as_ratios(value: object) -> Floats:
     ratios = as_series(value)
     if not (ratios > 0.0).all():
-        raise ValueError("must be greater than 0 throughout; ratios to sigma_v0, for example [0.1, 0.2]")
+        raise ValueError("must have only values above 0; ratios to sigma_v0, for example [0.1, 0.2]")
     return ratios
 
 
@@ -76,14 +78,14 @@ PressureRatio = Annotated[
         gt=0.0,
         le=1.0,
         description="excess pore pressure ratio, 1",
-        json_schema_extra={"remedy": "0.98 is liquefaction in most tests"},
+        json_schema_extra={"remedy": "0.98 is the usual criterion of liquefaction"},
     ),
 ]
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """What the specimens of a series have in common: arguments of :func:`cyclic_dss`."""
+    """Conditions shared by the specimens of a series; meaning and units as for :func:`cyclic_dss`."""
 
     sigma_v0: float = correlations.P_ATM
     K0: float = 0.5
@@ -92,18 +94,18 @@ class Conditions:
     integrator: str = "default"
 
     def check(self, where: str, soil: Soil, csr: Floats | None = None) -> None:
-        """Refuse, before any test, conditions and stress ratios that a specimen cannot bear."""
+        """Refuse conditions and stress ratios that a specimen cannot carry, before any test."""
         specimen = consolidated(where, soil, **self.arguments(), tolerance=None)
         if csr is not None:
             check_reach(f"{where}.csr", soil, specimen, self.static_shear_ratio + csr, drained=False)
 
     def arguments(self) -> dict[str, Any]:
-        """As keyword arguments."""
+        """The conditions as keyword arguments."""
         return dict(vars(self))
 
 
 def criterion_of(gamma_sa: float | None, gamma_da: float | None, r_u: float | None) -> dict[str, float]:
-    """The one criterion that was given; 3 % single-amplitude strain if none was."""
+    """The given criterion by name and level; 3 % single-amplitude strain if none is given."""
     given = {"gamma_sa": gamma_sa, "gamma_da": gamma_da, "r_u": r_u}
     named = {name: value for name, value in given.items() if value is not None}
     if len(named) > 1:
@@ -116,17 +118,18 @@ def criterion_of(gamma_sa: float | None, gamma_da: float | None, r_u: float | No
 def _stop_strain(criterion: dict[str, float]) -> float:
     if "gamma_sa" in criterion:
         return criterion["gamma_sa"]
-    # A double amplitude lies within as much single amplitude on either side of the start.
+    # When the single amplitude reaches the level of a double amplitude, the double amplitude has reached it
+    # too.
     return max(_GAMMA_STOP, criterion.get("gamma_da", 0.0))
 
 
 def falls_short(
     soil: Soil, csr: float, cycles: float, criterion: dict[str, float], conditions: Conditions
 ) -> bool:
-    """Whether a uniform stress ratio meets the criterion in fewer than so many cycles."""
-    survived = math.ceil(2.0 * cycles) - 1
-    strokes = np.where(np.arange(survived) % 2 == 0, csr, -csr)
-    if survived == 0:
+    """Whether a uniform stress ratio meets the criterion in fewer than `cycles` cycles."""
+    count = math.ceil(2.0 * cycles) - 1
+    strokes = np.where(np.arange(count) % 2 == 0, csr, -csr)
+    if count == 0:
         return False
     try:
         test = cyclic_dss(
@@ -138,13 +141,13 @@ def falls_short(
     except InvalidInput as refusal:
         if refusal.path != "lab.cyclic_dss.reversals":
             raise
-        # More than the strength: the first stroke goes on without end.
+        # The stress ratio exceeds the strength: strain grows without limit in the first stroke.
         return True
     return not math.isnan(test.cycles_to(**criterion))
 
 
 def bisect(condition: Callable[[float], bool], low: float, high: float) -> float:
-    """Where a condition turns true between `low` (false) and `high` (true); both positive."""
+    """The value where a condition becomes true, between `low` (false) and `high` (true); both positive."""
     while high / low > 1.0 + _WIDTH:
         middle = math.sqrt(low * high)
         if condition(middle):
@@ -157,7 +160,7 @@ def bisect(condition: Callable[[float], bool], low: float, high: float) -> float
 def bracket(
     condition: Callable[[float], bool], guess: float, factor: float, limits: tuple[float, float]
 ) -> tuple[float, float] | None:
-    """Two values around the turn of a condition, false then true; None if it lies outside the limits."""
+    """Values for which a condition is false and true, in this order; None if there are none in the limits."""
     low = high = guess
     if condition(guess):
         while True:
@@ -188,13 +191,27 @@ def crr(
     void_ratio: VoidRatio = None,
     integrator: Integrator = "default",
 ) -> float:
-    """Cyclic resistance ratio: the uniform CSR that meets a criterion in `cycles`, in undrained simple shear.
+    """Cyclic resistance ratio: the uniform CSR that meets a criterion in `cycles` undrained cycles.
 
-    One criterion: `gamma_sa` or `gamma_da` (single or double amplitude of engineering strain) or `r_u`; 3 %
-    single amplitude if none is given. Stress in kPa. Cycles are counted by halves, the one in which the
-    criterion is met included, and the first stroke from the static stress counts as a half: the answer is the
-    largest stress ratio that needs no fewer than `cycles`. nan where there is none between 0.005 and 3.
-    Raises :class:`InvalidInput`.
+    It is the largest stress ratio that needs at least `cycles` cycles. Cycles are counted by halves,
+    including the half cycle in which the criterion is met. The first stroke from the static stress counts as
+    half a cycle.
+
+    Parameters
+    ----------
+    soil : a material, or a model written by the user (:class:`SoilModel`)
+    cycles : number of uniform cycles
+    gamma_sa, gamma_da : criterion: single or double amplitude of the engineering shear strain, 1
+    r_u : criterion: excess pore pressure ratio, 1. At most one criterion is given; default gamma_sa = 0.03
+    sigma_v0, K0, static_shear_ratio, void_ratio, integrator : as for :func:`cyclic_dss`
+
+    Returns
+    -------
+    Cyclic shear stress over sigma_v0; nan if there is no resistance between 0.005 and 3
+
+    Raises
+    ------
+    InvalidInput : an invalid argument, or an initial stress that the soil cannot carry
     """
     criterion = criterion_of(gamma_sa, gamma_da, r_u)
     conditions = Conditions(sigma_v0, K0, static_shear_ratio, void_ratio, integrator)
@@ -209,7 +226,7 @@ def resistance(
     guess: float = _CSR_GUESS,
     step: float = _BRACKETING,
 ) -> float:
-    """The resistance of :func:`crr` next to a guess, from which the search goes out by factors of `step`."""
+    """The resistance of :func:`crr` by a search from `guess` in steps of the factor `step`."""
 
     def weaker(csr: float) -> bool:
         return falls_short(soil, csr, cycles, criterion, conditions)
@@ -220,15 +237,22 @@ def resistance(
 
 @dataclass(frozen=True, eq=False)
 class ResistanceCurve(Table):
-    """CSR against cycles for several criteria. `cycles[name]` goes with `csr`, counted by halves as in
-    :func:`crr`; nan where a criterion was not met."""
+    """CSR against cycles for several criteria.
+
+    Attributes
+    ----------
+    csr : (n,) cyclic stress ratios
+    cycles : for each criterion by name (n,) cycles to it, counted by halves as in :func:`crr`; nan where it
+        was not met
+    conditions : conditions of the tests
+    """
 
     csr: Floats
     cycles: dict[str, Floats]
     conditions: Conditions = field(repr=False)
 
     def csr_at(self, cycles: float, criterion: str = "3 % single amplitude") -> float:
-        """CSR at a number of cycles, by interpolation in the logarithms; nan outside the curve."""
+        """CSR at a number of cycles, by linear interpolation of the logarithms; nan outside the curve."""
         reached = self.cycles[criterion]
         known = np.isfinite(reached)
         order = np.argsort(reached[known])
@@ -236,11 +260,11 @@ class ResistanceCurve(Table):
         return float(np.exp(np.interp(math.log(cycles), x, y, left=math.nan, right=math.nan)))
 
     def columns(self) -> dict[str, Floats]:
-        """`csr`, and the cycles to each criterion by its name."""
+        """`csr`, and the cycles to each criterion by name."""
         return {"csr": self.csr, **self.cycles}
 
     def plot(self) -> Figure:
-        """CSR against cycles, logarithmic."""
+        """Plot CSR against cycles on a logarithmic axis; a matplotlib figure."""
         from ._resistance_plots import resistance
 
         return resistance(self)
@@ -260,8 +284,17 @@ def crr_curve(
 ) -> ResistanceCurve:
     """CSR against cycles for the three usual criteria: 3 % single amplitude, r_u 0.98, 5 % double amplitude.
 
-    One test for each `csr`; without them eight around the resistance in 15 cycles. Raises
-    :class:`InvalidInput`.
+    Parameters
+    ----------
+    csr : (n,) cyclic stress ratios, one test for each; default eight values around the resistance in 15
+        cycles
+    max_cycles : number of cycles after which a test ends; its criteria that are not met are nan
+    soil, sigma_v0, K0, static_shear_ratio, void_ratio, integrator : as for :func:`cyclic_dss`
+
+    Raises
+    ------
+    InvalidInput : an invalid argument, an initial stress that the soil cannot carry, or a stress ratio that
+        it cannot reach
     """
     conditions = Conditions(sigma_v0, K0, static_shear_ratio, void_ratio, integrator)
     if csr is None:
@@ -270,7 +303,7 @@ def crr_curve(
             raise InvalidInput(
                 "lab.crr_curve.csr",
                 None,
-                "must be given: this sand has no resistance in 15 cycles to start from",
+                "must be given, because no cyclic resistance in 15 cycles was found to choose it from",
                 "for example [0.1, 0.2, 0.3]",
             )
         ratios = middle * np.asarray(_CURVE_FRACTIONS)
@@ -289,26 +322,29 @@ def crr_curve(
 
 @dataclass(frozen=True, eq=False)
 class FactorCurve(Table):
-    """A factor on cyclic resistance: the model's, and the published one beside it."""
+    """A correction factor on cyclic resistance, of the model and as published. Arrays have shape (n,)."""
 
     name: str
     """`K_sigma` or `K_alpha`."""
     argument: str
-    """What it is drawn against, with its unit."""
+    """Name and unit of `x`."""
     x: Floats
+    """Vertical effective stress, kPa, or static shear ratio, 1."""
     crr: Floats
     """Cyclic resistance ratio of the model at each `x`."""
     factor: Floats
     """`crr` over that of the reference condition."""
     published: Floats
+    """The published factor at each `x`."""
     source: str
+    """Authors and year of the published factor."""
 
     def columns(self) -> dict[str, Floats]:
         """`x`, `crr`, `factor` and `published`."""
         return {"x": self.x, "crr": self.crr, "factor": self.factor, "published": self.published}
 
     def plot(self) -> Figure:
-        """The factor beside the published one."""
+        """Plot the factor and the published factor; a matplotlib figure."""
         from ._resistance_plots import factor
 
         return factor(self)
@@ -324,7 +360,20 @@ def k_sigma(
     K0: EarthPressure = 0.5,
     integrator: Integrator = "default",
 ) -> FactorCurve:
-    """Effect of overburden on cyclic resistance, beside Boulanger and Idriss (2004). Stresses in kPa."""
+    """Overburden factor on cyclic resistance of the model, and that of Boulanger and Idriss (2004).
+
+    The reference condition is a vertical effective stress of 101.3 kPa.
+
+    Parameters
+    ----------
+    sigma_v0 : (n,) vertical effective stresses, kPa
+    cycles, gamma_sa : number of cycles and criterion, as for :func:`crr`
+    soil, K0, integrator : as for :func:`cyclic_dss`
+
+    Raises
+    ------
+    InvalidInput : an invalid argument, or an initial stress that the soil cannot carry
+    """
     stresses = np.asarray(sigma_v0, dtype=np.float64)
     blows = correlations.spt_from_relative_density(soil.Dr)
     published = np.asarray([correlations.k_sigma(float(s), N160cs=blows) for s in stresses])
@@ -359,7 +408,20 @@ def k_alpha(
     K0: EarthPressure = 0.5,
     integrator: Integrator = "default",
 ) -> FactorCurve:
-    """Effect of sustained shear on cyclic resistance, beside Idriss and Boulanger (2003). Stress in kPa."""
+    """Static shear factor on cyclic resistance of the model, and that of Idriss and Boulanger (2003).
+
+    The reference condition is a static shear ratio of 0.
+
+    Parameters
+    ----------
+    static_shear_ratio : (n,) static shear stresses over sigma_v0
+    cycles, gamma_sa : number of cycles and criterion, as for :func:`crr`
+    soil, sigma_v0, K0, integrator : as for :func:`cyclic_dss`
+
+    Raises
+    ------
+    InvalidInput : an invalid argument, or an initial stress that the soil cannot carry
+    """
     ratios = np.asarray(static_shear_ratio, dtype=np.float64)
     published = np.asarray(
         [correlations.k_alpha(float(a), Dr=soil.Dr, sigma_v0=sigma_v0, K0=K0) for a in ratios]

@@ -1,4 +1,4 @@
-"""Pictures of cyclic resistance."""
+"""Plots of cyclic resistance."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
     from ._resistance import FactorCurve, ResistanceCurve
 
 _MARKERS = ("o", "s", "^")
-# Shades of a curve's criteria: the first is the one that calibrations go by.
-_SHADES = (OURS, "#009E73", INPUT)
+# Colours of the criteria; the first criterion is the default of calibrations.
+_COLOURS = (OURS, "#009E73", INPUT)
 
 
 def resistance(curve: ResistanceCurve, target: tuple[float, float] | None = None) -> Figure:
-    """CSR against cycles for each criterion; `target` is the point (cycles, CSR) of a calibration."""
+    """CSR against cycles for each criterion; `target`: the point (cycles, CSR) of a calibration."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(5.6, 4.0), layout="constrained")
         axes = figure.subplots()
-        for (name, cycles), marker, colour in zip(curve.cycles.items(), _MARKERS, _SHADES, strict=True):
+        for (name, cycles), marker, colour in zip(curve.cycles.items(), _MARKERS, _COLOURS, strict=True):
             order = np.argsort(cycles)
             axes.plot(cycles[order], curve.csr[order], marker=marker, ms=4.0, color=colour, label=name)
         if target is not None:
@@ -40,7 +40,7 @@ def resistance(curve: ResistanceCurve, target: tuple[float, float] | None = None
 
 
 def factor(curve: FactorCurve) -> Figure:
-    """A factor on cyclic resistance beside the published one."""
+    """A correction factor on cyclic resistance and the published factor."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(5.0, 3.6), layout="constrained")
         axes = figure.subplots()

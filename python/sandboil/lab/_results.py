@@ -1,4 +1,4 @@
-"""What the tests give back: plain arrays, with the few questions that one asks of them."""
+"""Results of the tests: arrays, and the quantities derived from them."""
 
 from __future__ import annotations
 
@@ -22,12 +22,14 @@ class Table(ABC):
 
     @abstractmethod
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Every column by its name."""
+        """Every column by name."""
 
     def to_dataframe(self) -> Any:
-        """One row per record, one column per array, as a pandas DataFrame.
+        """The columns as a pandas DataFrame.
 
-        Raises :class:`ImportError` that says how to get pandas where it is missing.
+        Raises
+        ------
+        ImportError : pandas is not installed; the message says how to install it
         """
         try:
             import pandas
@@ -38,11 +40,11 @@ class Table(ABC):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Record(Table):
-    """Rows of a test, and how it ended.
+    """Recorded rows of a test, and why it ended.
 
     Attributes
     ----------
-    complete : False if the soil gave up before the end that was asked for
+    complete : False if the test ended early because the soil failed
     ended : why the test ended, in words
     """
 
@@ -50,7 +52,7 @@ class Record(Table):
     ended: str
 
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Every one-dimensional array by its name."""
+        """Every one-dimensional array by name."""
         values = {name: getattr(self, name) for name in self._names()}
         return {name: value for name, value in values.items() if np.ndim(value) == 1}
 
@@ -69,10 +71,10 @@ class ShearTest(Record):
     tau : shear stress, kPa
     sigma_v_eff, sigma_h_eff : vertical and horizontal effective stress, kPa, compression positive
     eps_v : volumetric strain since the start, 1, contraction positive
-    void_ratio : nan for models that have none
-    sigma_v0 : vertical effective stress at the start, kPa
-    drained : whether the vertical effective stress was held, not the volume
-    specimen : the soil after the test, or None where it is not at hand
+    void_ratio : nan for a model without void ratio
+    sigma_v0 : initial vertical effective stress, kPa, compression positive
+    drained : True: constant vertical effective stress. False: constant volume
+    specimen : the soil after the test; None if it was not kept
     """
 
     gamma: Floats
@@ -95,8 +97,10 @@ class ShearTest(Record):
         return [*super()._names(), "r_u"]
 
     def plot(self, reference: object | None = None) -> Figure:
-        """Stress-strain curve, stress path, and pore pressure or volume over strain, as a matplotlib figure;
-        `reference` as for :meth:`CyclicTest.plot`, without `cycle`."""
+        """Plot stress-strain curve, stress path, and pore pressure (drained: contraction) against strain.
+
+        Returns a matplotlib figure. `reference` as for :meth:`CyclicTest.plot`, without `cycle`.
+        """
         from ._plots import monotonic
 
         return monotonic(self, reference)
@@ -108,9 +112,9 @@ class CyclicTest(ShearTest):
 
     Attributes
     ----------
-    cycle : cycles so far, shape (n,): 0.25 at the first turn, half a cycle from turn to turn, in between in
-        proportion to the shear stress (to the shear strain where that is turned)
-    turns : turns made so far, that at this row included, shape (n,), integers
+    cycle : (n,) number of cycles so far: 0.25 at the first turn, 0.5 more at each further turn. Between turns
+        it is linear in the shear stress (in the shear strain, if the turns are given by strain)
+    turns : (n,) number of turns so far, including one at this row; integers
     """
 
     cycle: Floats
@@ -119,23 +123,25 @@ class CyclicTest(ShearTest):
     def cycles_to(
         self, *, r_u: float | None = None, gamma_sa: float | None = None, gamma_da: float | None = None
     ) -> float:
-        """Cycles until one measure first reaches a level, or nan if it never does.
+        """Number of cycles until one measure first reaches a level; nan if it does not.
 
         Parameters
         ----------
-        r_u : excess pore pressure ratio, 1
-        gamma_sa : single amplitude, the distance of the shear strain from its value at the start, 1
-        gamma_da : double amplitude, the distance of the shear strain from its value at the last turn, 1;
-            there is none before the first turn
+        r_u : level of the excess pore pressure ratio, 1
+        gamma_sa : level of the single amplitude, the change of shear strain since the start, 1
+        gamma_da : level of the double amplitude, the change of shear strain since the last turn, 1; it is
+            zero before the first turn
 
         Raises
         ------
         InvalidInput : not exactly one measure, or a level that is not positive
         """
-        asked = {"r_u": r_u, "gamma_sa": gamma_sa, "gamma_da": gamma_da}
-        given = {name: level for name, level in asked.items() if level is not None}
+        measures = {"r_u": r_u, "gamma_sa": gamma_sa, "gamma_da": gamma_da}
+        given = {name: level for name, level in measures.items() if level is not None}
         if len(given) != 1:
-            raise InvalidInput("cycles_to", given, f"must be given exactly one measure of {', '.join(asked)}")
+            raise InvalidInput(
+                "cycles_to", given, f"must be given exactly one measure of {', '.join(measures)}"
+            )
         ((name, level),) = given.items()
         if not level > 0.0:
             raise InvalidInput(f"cycles_to.{name}", level, "must be greater than 0")
@@ -156,12 +162,14 @@ class CyclicTest(ShearTest):
 
     @property
     def gamma_da(self) -> Floats:
-        """Double amplitude of the shear strain, |gamma - gamma at the last turn|, 1, shape (n,): at a turn
-        the whole stroke from the turn before, 0 up to the first turn."""
+        """Double amplitude of the shear strain, |gamma - gamma at the last turn|, 1, shape (n,).
+
+        At a turn it is the change since the turn before; up to the first turn it is 0.
+        """
         at_turn = self._rows_of_turns()
         passed = self.turns.copy()
         passed[at_turn] -= 1
-        # Rows that no turn precedes take the last entry.
+        # For rows before the first turn the index is -1: the appended nan.
         turned = np.append(self.gamma[at_turn], np.nan)[passed - 1]
         amplitude: Floats = np.nan_to_num(np.abs(self.gamma - turned))
         return amplitude
@@ -170,16 +178,17 @@ class CyclicTest(ShearTest):
         return np.flatnonzero(np.diff(self.turns, prepend=0))
 
     def peaks(self) -> Self:
-        """The rows at the turns only, without the specimen."""
+        """A copy that contains only the rows at the turns, without the specimen."""
         at_turn = self._rows_of_turns()
         stored = self.columns().keys() & {each.name for each in fields(self)}
         return replace(self, specimen=None, **{name: getattr(self, name)[at_turn] for name in stored})
 
     def plot(self, reference: object | None = None) -> Figure:
-        """Stress path, stress-strain loops, and pore pressure and strain over cycles, as a matplotlib figure.
+        """Plot stress path, stress-strain loops, and pore pressure (or contraction) and strain over cycles.
 
-        `reference` is drawn beside: another test, or anything with `gamma`, `tau`, `sigma_v_eff`, `r_u` and
-        `cycle` as attributes or as keys.
+        Returns a matplotlib figure. `reference` is added to each plot: another test, or any object with
+        `gamma`, `tau`, `sigma_v_eff`, `r_u` and `cycle` (drained: `eps_v` instead of `r_u`) as attributes or
+        keys.
         """
         from ._plots import cyclic
 
@@ -188,16 +197,16 @@ class CyclicTest(ShearTest):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PathTest(Record):
-    """A path of strain or of stress, one row for each that was asked for; tension positive.
+    """A strain or stress path, with one row for each row of the given path; tension positive.
 
-    An incomplete test has fewer rows, and its last one is where the soil gave up.
+    An incomplete test has fewer rows; the last one is the state at failure.
 
     Attributes
     ----------
-    strain : xx, yy and engineering xy, 1, shape (n, 3)
-    stress : effective, xx, yy and xy, kPa, shape (n, 3)
-    stress_zz : out of the plane, kPa, shape (n,)
-    void_ratio : shape (n,); nan for models that have none
+    strain : (n, 3), xx, yy and engineering xy, 1
+    stress : (n, 3), effective stress xx, yy and xy, kPa
+    stress_zz : (n,), out-of-plane effective stress, kPa
+    void_ratio : (n,); nan for a model without void ratio
     """
 
     strain: Floats
@@ -206,7 +215,7 @@ class PathTest(Record):
     void_ratio: Floats
 
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Every component by its name."""
+        """Every component by name."""
         return {
             **dict(zip(("eps_xx", "eps_yy", "gamma_xy"), self.strain.T, strict=True)),
             **dict(zip(("sig_xx", "sig_yy", "tau_xy"), self.stress.T, strict=True)),
@@ -235,8 +244,11 @@ class PathTest(Record):
         return self.strain[:, 0] + self.strain[:, 1]
 
     def plot(self, reference: object | None = None) -> Figure:
-        """Shear stress over shear strain and over mean stress, and mean stress over volume; `reference` has
-        `gamma_xy`, `tau_xy`, `mean` and `volume`."""
+        """Plot shear stress against shear strain and against mean stress, and mean stress against volume.
+
+        Returns a matplotlib figure. `reference` is added to each plot; it must have `gamma_xy`, `tau_xy`,
+        `mean` and `volume`.
+        """
         from ._plots import path
 
         return path(self, reference)
@@ -244,14 +256,14 @@ class PathTest(Record):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CompressionTest(Record):
-    """Compression in plane strain. Each array has shape (n,); compression and contraction positive.
+    """Vertical compression in plane strain. Each array has shape (n,); compression and contraction positive.
 
     Attributes
     ----------
     axial_strain : vertical strain, 1
     sigma_v_eff, sigma_h_eff : vertical and horizontal effective stress, kPa
     eps_v : volumetric strain, 1
-    void_ratio : nan for models that have none
+    void_ratio : nan for a model without void ratio
     """
 
     axial_strain: Floats
@@ -267,12 +279,12 @@ class CompressionTest(Record):
 
     @property
     def q(self) -> Floats:
-        """Stress difference, vertical less horizontal, kPa."""
+        """Stress difference, vertical minus horizontal, kPa."""
         return self.sigma_v_eff - self.sigma_h_eff
 
     @property
     def excess_pore_pressure(self) -> Floats:
-        """Excess pore pressure where the total lateral stress is held, kPa; 0 in a drained test."""
+        """Excess pore pressure at constant total lateral stress, kPa; 0 in a drained test."""
         pressure: Floats = self.sigma_h_eff[0] - self.sigma_h_eff
         return pressure
 
@@ -281,8 +293,10 @@ class CompressionTest(Record):
         return [*super()._names(), "p", "q", "excess_pore_pressure"]
 
     def plot(self, reference: object | None = None) -> Figure:
-        """Stress difference over strain and over mean stress, and pore pressure or contraction over strain;
-        `reference` has arrays of the same names."""
+        """Plot stress difference over strain and mean stress, and pore pressure or contraction over strain.
+
+        Returns a matplotlib figure. `reference` is added to each plot; it must have arrays of the same names.
+        """
         from ._plots import compression
 
         return compression(self, reference)
@@ -290,15 +304,15 @@ class CompressionTest(Record):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Reconsolidation(Record):
-    """Dissipation after shear. Each array has shape (n,).
+    """Dissipation of excess pore pressure after shear. Each array has shape (n,).
 
     Attributes
     ----------
     sigma_v_eff, sigma_h_eff : vertical and horizontal effective stress, kPa, compression positive
-    eps_v : volumetric strain since the dissipation began, 1, contraction positive
+    eps_v : volumetric strain since the beginning of the dissipation, 1, contraction positive
     gamma : engineering shear strain since the start of the shear test, 1
     tau : shear stress, kPa
-    void_ratio : nan for models that have none
+    void_ratio : nan for a model without void ratio
     """
 
     sigma_v_eff: Floats
@@ -309,8 +323,10 @@ class Reconsolidation(Record):
     void_ratio: Floats
 
     def plot(self, reference: object | None = None) -> Figure:
-        """Vertical effective stress over contraction, and shear stress over it; `reference` has arrays of the
-        same names."""
+        """Plot vertical effective stress over contraction, and shear stress over vertical effective stress.
+
+        Returns a matplotlib figure. `reference` is added to each plot; it must have arrays of the same names.
+        """
         from ._plots import reconsolidation
 
         return reconsolidation(self, reference)
@@ -318,14 +334,14 @@ class Reconsolidation(Record):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ModulusReduction(Record):
-    """Secant shear modulus and damping over strain. Each array has shape (n,).
+    """Secant shear modulus and damping against strain amplitude. Each array has shape (n,).
 
     Attributes
     ----------
     gamma : amplitude of the engineering shear strain, 1
     G : secant shear modulus, kPa
     damping : damping ratio, 1
-    G_max : elastic shear modulus at the start, kPa
+    G_max : initial elastic shear modulus, kPa
     """
 
     gamma: Floats
@@ -343,7 +359,11 @@ class ModulusReduction(Record):
         return [*super()._names(), "G_ratio"]
 
     def plot(self, reference: object | None = None) -> Figure:
-        """Modulus ratio and damping over strain; `reference` has `gamma`, `G_ratio` and `damping`."""
+        """Plot modulus ratio and damping ratio against strain.
+
+        Returns a matplotlib figure. `reference` is added to each plot; it must have `gamma`, `G_ratio` and
+        `damping`.
+        """
         from ._plots import modulus
 
         return modulus(self, reference)

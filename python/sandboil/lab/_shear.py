@@ -1,4 +1,4 @@
-"""Direct simple shear: no lateral strain; the volume is held (undrained) or the vertical stress (drained)."""
+"""Direct simple shear at constant volume (undrained) or constant vertical stress (drained)."""
 
 from __future__ import annotations
 
@@ -30,9 +30,11 @@ from ._arguments import (
 from ._results import CyclicTest, ShearTest
 from ._specimen import consolidated
 
-# Shear strain of one increment. Turns are met exactly whatever it is, and the models divide it further.
+# Shear strain of one increment. Turns are met exactly for any value, and the models divide the increment
+# further.
 STRAIN_STEP = 1.0e-5
-# Changes that are worth a row: of stress over sigma_v0, and of strain. No picture shows more.
+# Changes after which a row is recorded: of stress, over sigma_v0, and of strain. Smaller changes are
+# invisible in plots.
 STRESS_RESOLUTION, STRAIN_RESOLUTION = 0.004, 1.0e-4
 
 
@@ -53,36 +55,39 @@ def cyclic_dss(
     integrator: Integrator = "default",
     tolerance: Tolerance = None,
 ) -> CyclicTest:
-    """Cyclic direct simple shear, uniform (`csr`), irregular (`reversals`) or by strain (`gamma_reversals`).
+    """Cyclic direct simple shear: uniform (`csr`), irregular (`reversals`) or by strain (`gamma_reversals`).
 
     Parameters
     ----------
-    soil : a material, or a model of your own (:class:`SoilModel`)
-    sigma_v0 : vertical effective stress at the start, kPa, compression positive
-    K0 : horizontal over vertical effective stress at the start
-    csr : amplitude of the shear stress over sigma_v0; the test turns at (static_shear_ratio + csr) sigma_v0
-        first, then at (static_shear_ratio - csr) sigma_v0, and so on
-    static_shear_ratio : shear stress at the start over sigma_v0
-    void_ratio : at the start; default the soil's own
-    gamma_stop : distance of the shear strain from its start at which the test ends, 1
-    max_cycles : cycles of `csr` after which the test ends
-    drained : hold the vertical effective stress instead of the volume
-    reversals : turning points of shear stress over sigma_v0, shape (n,), the static one included
-    gamma_reversals : turning points of the shear strain, shape (n,), engineering, within gamma_stop
-    integrator : of rate-type models: "default", "rk4" or "reference" (commits of 2.5e-6)
+    soil : a material, or a model written by the user (:class:`SoilModel`)
+    sigma_v0 : initial vertical effective stress, kPa, compression positive
+    K0 : initial ratio of horizontal to vertical effective stress
+    csr : amplitude of the shear stress over sigma_v0. The first turn is at (static_shear_ratio + csr)
+        sigma_v0, the second at (static_shear_ratio - csr) sigma_v0, and so on
+    static_shear_ratio : initial shear stress over sigma_v0
+    void_ratio : initial void ratio; default that of the soil
+    gamma_stop : change of the shear strain since the start, 1, at which the test ends
+    max_cycles : number of cycles of `csr` after which the test ends
+    drained : True: constant vertical effective stress. False: constant volume (undrained)
+    reversals : (n,) shear stresses at the turns, over sigma_v0, including the static shear stress
+    gamma_reversals : (n,) engineering shear strains at the turns, 1, within gamma_stop
+    integrator : for rate-type models: "default", "rk4" or "reference" (commits of 2.5e-6)
     tolerance : relative error per sub-step of the default integrator
 
     Raises
     ------
-    InvalidInput : an argument that has no sense, a start that the soil cannot carry, or a shear stress that
-        it can never reach
+    InvalidInput : an invalid argument, an initial stress that the soil cannot carry, or a shear stress that
+        it cannot reach
     """
     where = "lab.cyclic_dss"
-    asked = {"csr": csr, "reversals": reversals, "gamma_reversals": gamma_reversals}
-    given = [name for name, value in asked.items() if value is not None]
+    loadings = {"csr": csr, "reversals": reversals, "gamma_reversals": gamma_reversals}
+    given = [name for name, value in loadings.items() if value is not None]
     if len(given) != 1:
         raise InvalidInput(
-            where, given, f"must be given exactly one of {', '.join(asked)}", "csr = 0.15 is a uniform test"
+            where,
+            given,
+            f"must be given exactly one of {', '.join(loadings)}",
+            "csr = 0.15 is a uniform test",
         )
     specimen = consolidated(
         where,
@@ -97,10 +102,10 @@ def cyclic_dss(
     (name,) = given
     if csr is not None:
         turning, count = np.array([static_shear_ratio + csr, static_shear_ratio - csr]), 2 * max_cycles
-        finished = f"max_cycles = {max_cycles} were done"
+        finished = f"max_cycles = {max_cycles} was reached"
     else:
-        turning, count = np.asarray(asked[name], dtype=np.float64), None
-        finished = f"all {name} were made"
+        turning, count = np.asarray(loadings[name], dtype=np.float64), None
+        finished = f"all {name} were reached"
         begin = static_shear_ratio if name == "reversals" else 0.0
         _check_alternation(f"{where}.{name}", begin, turning)
     if name == "gamma_reversals":
@@ -109,7 +114,7 @@ def cyclic_dss(
                 f"{where}.{name}",
                 float(turning[np.abs(turning).argmax()]),
                 f"must lie within gamma_stop = {gamma_stop:g}",
-                "give a larger gamma_stop",
+                "use a larger gamma_stop",
             )
         turns = [("strain", float(value)) for value in turning]
     else:
@@ -118,7 +123,7 @@ def cyclic_dss(
     record, ending = sheared(
         specimen, turns, count=count, drained=drained, strain_limit=gamma_stop, sigma_v0=sigma_v0
     )
-    limit = limit_told(gamma_stop, record["turns"])
+    limit = strain_limit_message(gamma_stop, record["turns"])
     return CyclicTest(
         **shear_columns(record),
         cycle=record["cycle"],
@@ -144,7 +149,18 @@ def monotonic_dss(
     integrator: Integrator = "default",
     tolerance: Tolerance = None,
 ) -> ShearTest:
-    """Direct simple shear in one direction, to the shear strain `gamma_max`; else as :func:`cyclic_dss`."""
+    """Monotonic direct simple shear.
+
+    Parameters
+    ----------
+    gamma_max : engineering shear strain at the end, 1
+    soil, sigma_v0, K0, static_shear_ratio, void_ratio, drained, integrator, tolerance : as for
+        :func:`cyclic_dss`
+
+    Raises
+    ------
+    InvalidInput : an invalid argument, or an initial stress that the soil cannot carry
+    """
     specimen = consolidated(
         "lab.monotonic_dss",
         soil,
@@ -177,7 +193,7 @@ def sheared(
     strain_step: float = STRAIN_STEP,
     strain_resolution: float = STRAIN_RESOLUTION,
 ) -> tuple[dict[str, NDArray[Any]], str]:
-    """The core's record of a shear from turn to turn, and how it ended."""
+    """Record of a shear test as the core returns it (tension positive), and why the test ended."""
     return specimen.shear(
         turns,
         drained=drained,
@@ -190,7 +206,7 @@ def sheared(
 
 
 def shear_columns(record: dict[str, NDArray[Any]]) -> dict[str, Any]:
-    """The core's record, tension positive, as a :class:`ShearTest` has it."""
+    """Arrays of a :class:`ShearTest` from a record of the core, which is tension positive."""
     strain, stress = record["strain"], record["stress"]
     return {
         "gamma": strain[:, 2],
@@ -202,46 +218,47 @@ def shear_columns(record: dict[str, NDArray[Any]]) -> dict[str, Any]:
     }
 
 
-def limit_told(gamma_stop: float, turns: NDArray[np.int64]) -> str:
-    """How a test ended that reached its largest strain."""
-    told = f"the shear strain reached gamma_stop = {gamma_stop:g}"
-    return told if turns[-1] else f"{told} before the first turn"
+def strain_limit_message(gamma_stop: float, turns: NDArray[np.int64]) -> str:
+    """Why a test ended that reached its largest strain."""
+    message = f"the shear strain reached gamma_stop = {gamma_stop:g}"
+    return message if turns[-1] else f"{message} before the first turn"
 
 
 def _check_alternation(path: str, begin: float, turning: Floats) -> None:
+    """Refuse turning points at which the direction of shear does not change."""
     strokes = np.sign(np.diff(turning, prepend=begin))
     wrong = np.flatnonzero((strokes == 0.0) | (strokes == np.append(0.0, strokes[:-1])))
     if len(wrong):
         raise InvalidInput(
             f"{path}[{wrong[0]}]",
             float(turning[wrong[0]]),
-            f"must turn back: each lies on the other side of the one before, which begins at {begin:g}",
-            "leave out the points on the way",
+            f"must be a reversal of the direction of shear; the test starts at {begin:g}",
+            "leave out points between two reversals",
         )
 
 
 def check_reach(path: str, soil: Soil, specimen: _core.Specimen, turning: Floats, *, drained: bool) -> None:
-    """Refuse turning points that PM4Sand can never reach: others are found out by the test itself."""
+    """Refuse turning points that PM4Sand cannot reach. For other soils the test itself shows it."""
     if not isinstance(soil, PM4Sand):
         return
     most = _largest_shear_ratio(soil, specimen, drained)
     beyond = turning[np.abs(turning) > most]
     if len(beyond):
-        strength = "bounding stress ratio" if drained else "critical-state strength"
+        strength = "strength at the bounding surface" if drained else "critical-state strength"
         raise InvalidInput(
             path,
             float(beyond[0]),
-            f"must turn within {most:.3f} of sigma_v0: this sand's {strength} allows no more",
-            "a ratio to sigma_v0 is meant, not a stress in kPa",
+            f"must be at most {most:.3f} in absolute value, the {strength} of this sand over sigma_v0",
+            "it is a ratio to sigma_v0, not a stress in kPa",
         )
 
 
 def _largest_shear_ratio(sand: PM4Sand, specimen: _core.Specimen, drained: bool) -> float:
-    """Bound of the shear stress over sigma_v0.
+    """Upper limit of the shear stress over sigma_v0.
 
-    A stress ratio q/p = M mobilises sin(phi) = M/2, under which no plane carries more than tan(phi). At
-    constant volume dense sand dilates until it is at critical state, where p follows from its density
-    (Boulanger and Ziotopoulou 2017).
+    A stress ratio q/p = M mobilises sin(phi) = M/2, so on any plane shear stress over normal stress is at
+    most tan(phi). At constant volume, dense sand dilates to the critical state, where p follows from its
+    density (Boulanger and Ziotopoulou 2017).
     """
     void_ratio = specimen.void_ratio
     assert void_ratio is not None

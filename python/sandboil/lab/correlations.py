@@ -1,8 +1,8 @@
 """Published correlations between in-situ tests, density, stiffness and cyclic resistance of clean sand.
 
-All are for one atmosphere of vertical effective stress, magnitude 7.5 and level ground unless the name says
-otherwise; arguments are plain numbers, stresses kPa. Each names its author and year and raises
-:class:`InvalidInput`.
+All are for a vertical effective stress of one atmosphere, magnitude 7.5 and level ground, except the factors
+for other conditions (`k_sigma`, `k_alpha`). Arguments are numbers; stresses are in kPa, compression positive.
+Each function gives its source, and raises :class:`InvalidInput` for a value outside its range.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from .._model import as_float
 P_ATM = 101.3
 """Atmospheric pressure, kPa."""
 
-# Blow count of relative density 1.
+# Blow count at a relative density of 1.
 _N_MAX = 46.0
-# Blow count and cone resistance at which the triggering curves end, at resistances of 2 and 3.7: denser sand
-# does not liquefy, and the polynomials run away.
+# Largest blow count and cone resistance of the triggering curves, at cyclic resistance ratios of 2 and 3.7.
+# Denser sand does not liquefy, and beyond them the polynomials diverge.
 _N_TRIGGERING_MAX = 37.5
 _QC_TRIGGERING_MAX = 211.0
-# Largest overburden, kPa, that the overburden factor is taken to: from some 3000 kPa on it would be negative.
+# Largest overburden stress for the overburden factor, kPa: above about 3000 kPa the factor would be negative.
 _OVERBURDEN_MAX = 2000.0
-# The sustained-shear relation was fitted up to these.
+# Range of the fit of the static shear factor: static shear ratio and state index.
 _ALPHA_MAX = 0.35
 _STATE_INDEX_RANGE = (-0.6, 0.1)
 
 
 def _within(name: str, value: float, low: float, high: float, meaning: str) -> float:
-    """The value as a float, refused unless it is one number above `low` and at most `high`."""
+    """Return the value as a float; refuse it unless it is a number above `low` and at most `high`."""
     upper = "" if math.isinf(high) else f" and at most {high:g}"
     try:
         number = as_float(value)
@@ -66,7 +66,7 @@ def relative_density_from_cpt(qc1Ncs: float) -> float:
             "correlations.qc1Ncs",
             qc1Ncs,
             "must give a relative density above 0 and at most 1, that is 21 to 254",
-            "it is the cone resistance over one atmosphere, not in MPa",
+            "it is normalised by atmospheric pressure, not in MPa",
         )
     return density
 
@@ -78,13 +78,13 @@ def shear_modulus_coefficient(N160cs: float) -> float:
 
 def crr_from_spt(N160cs: float) -> float:
     """Cyclic resistance ratio in 15 cycles from (N1)60cs (Idriss and Boulanger 2008)."""
-    n = _within("N160cs", N160cs, 0.0, _N_TRIGGERING_MAX, "above it sand does not liquefy")
+    n = _within("N160cs", N160cs, 0.0, _N_TRIGGERING_MAX, "denser sand does not liquefy")
     return math.exp(n / 14.1 + (n / 126.0) ** 2 - (n / 23.6) ** 3 + (n / 25.4) ** 4 - 2.8)
 
 
 def crr_from_cpt(qc1Ncs: float) -> float:
     """Cyclic resistance ratio in 15 cycles from q_c1Ncs (Boulanger and Idriss 2014)."""
-    q = _within("qc1Ncs", qc1Ncs, 0.0, _QC_TRIGGERING_MAX, "above it sand does not liquefy")
+    q = _within("qc1Ncs", qc1Ncs, 0.0, _QC_TRIGGERING_MAX, "denser sand does not liquefy")
     return math.exp(q / 113.0 + (q / 1000.0) ** 2 - (q / 140.0) ** 3 + (q / 137.0) ** 4 - 2.8)
 
 
@@ -100,7 +100,7 @@ def k_sigma(sigma_v0: float, *, N160cs: float | None = None, qc1Ncs: float | Non
             "correlations.k_sigma",
             (N160cs, qc1Ncs),
             "needs exactly one of N160cs and qc1Ncs",
-            "leave the other out",
+            "leave one of them out",
         )
     if N160cs is not None:
         n = _within("N160cs", N160cs, 0.0, _N_MAX, "clean-sand corrected blow count")
@@ -114,10 +114,17 @@ def k_sigma(sigma_v0: float, *, N160cs: float | None = None, qc1Ncs: float | Non
 
 
 def k_alpha(static_shear_ratio: float, *, Dr: float, sigma_v0: float, K0: float = 0.5) -> float:
-    """Sustained-shear factor on cyclic resistance at a static shear ratio (Idriss and Boulanger 2003, 2008).
+    """Static shear factor on cyclic resistance (Idriss and Boulanger 2003, 2008).
 
-    Through the relative state parameter index xi_R = 1/(10 - ln(100 p'/p_A)) - Dr with
-    p' = (1 + 2 K0) sigma_v0 / 3, which is kept in [-0.6, 0.1]; fitted for ratios up to 0.35.
+    It depends on the relative state parameter index xi_R = 1/(10 - ln(100 p'/p_A)) - Dr, limited to [-0.6,
+    0.1], with p' = (1 + 2 K0) sigma_v0 / 3.
+
+    Parameters
+    ----------
+    static_shear_ratio : static shear stress over `sigma_v0`, at most 0.35 in absolute value
+    Dr : relative density, fraction
+    sigma_v0 : vertical effective stress, kPa
+    K0 : horizontal over vertical effective stress
     """
     try:
         alpha = abs(as_float(static_shear_ratio))
@@ -128,7 +135,7 @@ def k_alpha(static_shear_ratio: float, *, Dr: float, sigma_v0: float, K0: float 
             "correlations.static_shear_ratio",
             static_shear_ratio,
             f"must lie in [-{_ALPHA_MAX}, {_ALPHA_MAX}] (static shear stress over sigma_v0)",
-            "the relation was fitted up to there",
+            "the relation was fitted to this range only",
         )
     density = _within("Dr", Dr, 0.0, 1.0, "relative density, fraction")
     earth_pressure = _within("K0", K0, 0.0, math.inf, "horizontal over vertical effective stress")
@@ -149,10 +156,15 @@ def estimates(
     sigma_v0: float = P_ATM,
     crr: float | None = None,
 ) -> dict[str, float]:
-    """`Dr`, `G0` and `crr` of a sand from one field test or from its density, by the correlations above.
+    """`Dr`, `G0` and `crr` of a sand from one field test or from its density, by these correlations.
 
-    The resistance is that at the vertical effective stress `sigma_v0`, kPa, through :func:`k_sigma`, unless
-    `crr` says it: then no triggering curve is asked, and the sand may be denser than they reach.
+    Parameters
+    ----------
+    N160cs, qc1Ncs, Dr : clean-sand corrected blow count, normalised cone resistance or relative density
+        (fraction); exactly one of them
+    sigma_v0 : vertical effective stress, kPa, for which `crr` is corrected by :func:`k_sigma`
+    crr : cyclic resistance ratio, if it is known. The triggering curve is then not used, so the sand may be
+        denser than its range
     """
     given = [
         name for name, value in {"N160cs": N160cs, "qc1Ncs": qc1Ncs, "Dr": Dr}.items() if value is not None
@@ -162,7 +174,7 @@ def estimates(
             "correlations.estimates",
             given,
             "needs exactly one of N160cs, qc1Ncs and Dr",
-            "choose the test that you trust most",
+            "use the most reliable one",
         )
     if qc1Ncs is not None:
         density = relative_density_from_cpt(qc1Ncs)

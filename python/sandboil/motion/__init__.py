@@ -1,4 +1,4 @@
-"""Ground motions: reading, integration, correction, measures, response spectra and generators.
+"""Ground motions: files, integration, correction, intensity measures, response spectra and generators.
 
 Theory and sources: docs/theory/motion.md.
 """

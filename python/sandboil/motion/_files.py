@@ -1,4 +1,4 @@
-"""Ground motion files: PEER .AT2 and CSV, read with every defect told by file and line."""
+"""Ground motion files: PEER .AT2 and CSV. Errors give the file and the line."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from ._series import (
     positive,
 )
 
-# Longest line taken, characters: some thousand columns; what a line is split into takes many times its text.
+# Longest accepted line, characters: several thousand columns. The cells of a line need many times its memory.
 MAX_LINE = 100_000
-# An .AT2 says its number of points within this many lines (four, in PEER's own).
+# The number of points of an .AT2 must be within this many lines (in PEER files it is in line four).
 MAX_HEADER_LINES = 50
-# A step of the time column may differ from the others by this fraction of it: rounded decimals differ
-# less, a missing sample by one whole step.
+# Largest relative difference of a step of the time column from the usual one. Rounded decimals differ less,
+# and a missing sample gives a difference of 1.
 STEP_TOLERANCE = 0.25
-# Digits kept of a spacing taken from a time column: those beyond are rounding of its decimals.
+# Significant digits of a spacing from a time column; further digits are round-off of its decimals.
 DT_DIGITS = 12
-# Numbers in a line of an .AT2, as PEER writes them (5E15.7), and their digits after the point.
+# Numbers per line of an .AT2, as in PEER files (5E15.7), and their digits after the decimal point.
 AT2_COLUMNS = 5
 AT2_DIGITS = 7
 
-# Accepted units: the quantity they tell and what their values are multiplied by to give g or m/s.
+# Accepted units: the quantity of each, and the factor to g or m/s.
 UNITS: dict[str, tuple[Quantity, float]] = {
     "g": ("acceleration_g", 1.0),
     "m/s2": ("acceleration_g", 1.0 / STANDARD_GRAVITY),
@@ -48,7 +48,7 @@ UNITS: dict[str, tuple[Quantity, float]] = {
 
 _UNSIGNED = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[EeDd][-+]?\d+)?"
 _NUMBER = rf"[-+]?{_UNSIGNED}"
-# Fortran columns filled to their width: each further number shows by its sign.
+# Numbers without separator, from Fortran columns of full width: each further number begins with its sign.
 _TOUCHING = re.compile(rf"{_NUMBER}(?:[-+]{_UNSIGNED})+")
 _EACH = re.compile(_NUMBER)
 _NOT_FINITE = re.compile(r"[-+]?(nan|inf|infinity)", re.IGNORECASE)
@@ -67,7 +67,7 @@ _TIME_COLUMN = re.compile(r"t(?:ime)?(?![a-z])", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Record:
-    """What a file holds: spacing in s, quantity, its (n,) samples in g or m/s, and the file's own unit."""
+    """Contents of a file: spacing in s, quantity, (n,) samples in g or m/s, and the unit in the file."""
 
     dt: float
     quantity: Quantity
@@ -92,17 +92,17 @@ def read_at2(path: str | os.PathLike[str]) -> Record:
             raise InvalidInput(
                 f"{name}, line {number}",
                 len(values),
-                f"at most {MAX_SAMPLES} points are taken",
-                "cut or thin the record",
+                f"must have at most {MAX_SAMPLES} points",
+                "shorten the record or increase its time step",
             )
     if len(values) != points:
         raise InvalidInput(
             f"{name}, NPTS",
             points,
-            f"must be the number of values in the file, which holds {len(values)}",
-            "the file is cut short or was edited: take a whole copy"
+            f"must be the number of values in the file, {len(values)}",
+            "the file is incomplete or was edited: use a complete copy"
             if len(values) < points
-            else "the file holds more than its header says: take an unedited copy",
+            else "the file has more values than its header says: use an unedited copy",
         )
     quantity, factor = UNITS[unit]
     samples = ground_motion(np.array(values) * factor, quantity, dt, lambda at: f"{name}, line {line_of[at]}")
@@ -110,10 +110,10 @@ def read_at2(path: str | os.PathLike[str]) -> Record:
 
 
 def _at2_header(name: str, lines: Iterator[tuple[int, str]]) -> tuple[list[str], int, float]:
-    """Header, number of points and spacing: the header ends with the line that holds NPTS and DT."""
+    """Header lines, number of points and spacing, s. The header ends with the line of NPTS and DT."""
     header: list[str] = []
     for number, line in islice(lines, MAX_HEADER_LINES):
-        # Single blanks: the patterns allow for any number in several places.
+        # Reduce all space to single blanks, so that the patterns take linear time.
         header.append(" ".join(line.split()))
         last = _NPTS_DT_LAST.search(header[-1])
         if last:
@@ -133,20 +133,20 @@ def _at2_header(name: str, lines: Iterator[tuple[int, str]]) -> tuple[list[str],
                 f"{place}, NPTS",
                 points,
                 f"must lie between 2 and {MAX_SAMPLES}",
-                "take a whole copy of the record",
+                "use a complete copy of the record",
             )
         return header, points, _record_dt(f"{place}, DT", _SECONDS.sub("", dt_text))
     raise InvalidInput(
         name,
         header[3] if len(header) > 3 else "",
-        f'must hold a line like "NPTS=   7990, DT=  0.0050 SEC" among its first {MAX_HEADER_LINES}',
-        "if it is no PEER .AT2 file, write it as CSV with a header row",
+        f'must have a line like "NPTS=   7990, DT=  0.0050 SEC" among its first {MAX_HEADER_LINES}',
+        "if it is not a PEER .AT2 file, save it as CSV with a header row",
     )
 
 
 def _record_dt(place: str, value: object) -> float:
     hint = f"the spacing in seconds, at most {MAX_DT:g}, for example 0.005"
-    # Fortran writes exponents with a D.
+    # Fortran may write the exponent with a D.
     number = re.sub("[dD]", "e", value) if isinstance(value, str) else value
     dt = positive(place, number, "seconds", hint)
     if dt > MAX_DT:
@@ -164,19 +164,19 @@ def _at2_unit(name: str, header: list[str]) -> str:
                     f"{name}, line {number}, unit",
                     found[1],
                     "must be one of G, CM/S2, M/S2",
-                    "an .AT2 file holds an acceleration; other quantities can be given as CSV",
+                    "an .AT2 file must contain an acceleration; use CSV for other quantities",
                 )
             return unit
     raise InvalidInput(
         f"{name}, unit",
         None,
-        'must be stated in a header line, as "ACCELERATION TIME SERIES IN UNITS OF G"',
+        'must be given in a header line, as "ACCELERATION TIME SERIES IN UNITS OF G"',
         "add the unit to the third line",
     )
 
 
 def _number(text: str) -> float:
-    """A number with a point, Fortran's D exponent included; nan and inf pass, to be refused as such."""
+    """A number, also with a Fortran exponent D. nan and inf are accepted here and refused later."""
     if _EACH.fullmatch(text):
         return float(text.upper().replace("D", "E"))
     if _NOT_FINITE.fullmatch(text):
@@ -185,7 +185,7 @@ def _number(text: str) -> float:
 
 
 def _plain_unit(text: str) -> str | None:
-    """The key of UNITS that a spelling means: CM/SEC**2, cm/s/s, gal, m_s2, G."""
+    """The key of UNITS for a spelling such as CM/SEC**2, cm/s/s, gal, m_s2 or G; None if unknown."""
     spelled = text.lower().replace("sec", "s").replace("**", "").replace("^", "").replace("_", "/")
     spelled = re.sub(r"/s/s$", "/s2", spelled)
     spelled = "cm/s2" if spelled in ("gal", "cm/s2") else spelled
@@ -201,13 +201,13 @@ def _at2_row(name: str, number: int, line: str, started: bool) -> list[float]:
                 row.append(_number(part))
             except ValueError:
                 if not started and not row:
-                    # Text below the NPTS line still belongs to the header.
+                    # Text after the NPTS line and before the first number still belongs to the header.
                     return []
                 raise InvalidInput(
                     f"{name}, line {number}",
                     token,
                     "must be a number",
-                    "repair the line or take another copy",
+                    "correct the line or use another copy",
                 ) from None
     return row
 
@@ -221,13 +221,13 @@ def read_csv(path: str | os.PathLike[str], unit: str | None, column: str | int |
         raise InvalidInput(
             f"{name}, line {header_line}",
             ",".join(header),
-            "must be a header row that names a time column and at least one more",
+            "must be a header row with a time column and at least one more column",
             'for example "time_s,acceleration_g"',
         )
     unit = unit if unit is None else _plain_unit(unit) or unit
     if unit is not None and unit not in UNITS:
-        told = _did_you_mean(unit, UNITS) or "convert the record to one of them"
-        raise InvalidInput("unit", unit, f"must be one of {', '.join(UNITS)}", told)
+        hint = _did_you_mean(unit, UNITS) or "convert the record to one of them"
+        raise InvalidInput("unit", unit, f"must be one of {', '.join(UNITS)}", hint)
     time_at = next((i for i, cell in enumerate(header) if _TIME_COLUMN.match(cell)), 0)
     value_at = _value_column(name, header, time_at, unit, column)
     unit = _csv_unit(name, header[value_at], unit)
@@ -240,8 +240,8 @@ def read_csv(path: str | os.PathLike[str], unit: str | None, column: str | int |
             raise InvalidInput(
                 f"{name}, line {number}",
                 ",".join(cells),
-                f"must have {len(header)} columns as the header has",
-                "repair the line or take another copy",
+                f"must have {len(header)} columns, as the header",
+                "correct the line or use another copy",
             )
         for target, at in ((times, time_at), (values, value_at)):
             try:
@@ -251,19 +251,22 @@ def read_csv(path: str | os.PathLike[str], unit: str | None, column: str | int |
                     f"{name}, line {number}, column {header[at]}",
                     cells[at],
                     "must be a number",
-                    "a gap in the record is not filled: repair it or take another copy",
+                    "gaps are not filled automatically: correct the record or use another copy",
                 ) from None
         line_of.append(number)
         if len(values) > MAX_SAMPLES:
             raise InvalidInput(
                 f"{name}, line {number}",
                 len(values),
-                f"at most {MAX_SAMPLES} points are taken",
-                "cut or thin the record",
+                f"must have at most {MAX_SAMPLES} points",
+                "shorten the record or increase its time step",
             )
     if len(values) < 2:
         raise InvalidInput(
-            f"{name}, number of points", len(values), "must be at least 2", "take a whole copy of the record"
+            f"{name}, number of points",
+            len(values),
+            "must be at least 2",
+            "use a complete copy of the record",
         )
     dt = _uniform_step(name, np.array(times), line_of)
     quantity, factor = UNITS[unit]
@@ -279,7 +282,7 @@ def read_csv(path: str | os.PathLike[str], unit: str | None, column: str | int |
 
 
 def _csv_rows(name: str) -> Iterator[tuple[int, list[str]]]:
-    """Line numbers and stripped cells; comment lines (#) and blank ones are passed over."""
+    """Line numbers and stripped cells; comment lines (#) and blank lines are skipped."""
     delimiter = None
     for number, line in _lines(name):
         if not line.strip() or line.lstrip().startswith("#"):
@@ -297,8 +300,8 @@ def _value_column(
             raise InvalidInput(
                 f"{name}, column",
                 column,
-                f"must be the number (from 0) of a column of {header} that is not time",
-                "or name the column",
+                f"must be the number (from 0) of a column of {header} other than time",
+                "or give the name of the column",
             )
         return column
     if column is not None:
@@ -308,7 +311,7 @@ def _value_column(
                 f"{name}, column",
                 column,
                 f"must be one of {', '.join(header)}",
-                _did_you_mean(column, header) or "columns are named by the file's header",
+                _did_you_mean(column, header) or "the names are those of the header of the file",
             )
         return lowered.index(column.lower())
     wanted = _VELOCITY_COLUMN if unit is not None and UNITS[unit][0] == "velocity" else _ACCELERATION_COLUMN
@@ -317,7 +320,7 @@ def _value_column(
 
 
 def _csv_unit(name: str, column: str, unit: str | None) -> str:
-    """The unit given, or else the one in the column's name; a contradiction is refused."""
+    """The given unit, or the unit in the name of the column; a contradiction is refused."""
     in_name = _COLUMN_UNIT.search(column)
     stated = _plain_unit(in_name[1]) if in_name else None
     if in_name and stated is None:
@@ -332,7 +335,7 @@ def _csv_unit(name: str, column: str, unit: str | None) -> str:
             raise InvalidInput(
                 f"{name}, unit",
                 None,
-                f"must be stated, one of {', '.join(UNITS)}",
+                f"must be given, one of {', '.join(UNITS)}",
                 f'give unit="g", or name the column "{column}_g"',
             )
         return stated
@@ -340,14 +343,14 @@ def _csv_unit(name: str, column: str, unit: str | None) -> str:
         raise InvalidInput(
             f"{name}, unit",
             unit,
-            f'contradicts the column "{column}", whose name says {stated}',
-            "correct either",
+            f'contradicts the name of the column "{column}", which has the unit {stated}',
+            "correct one of them",
         )
     return unit
 
 
 def _uniform_step(name: str, times: Array, line_of: list[int]) -> float:
-    """Spacing of a time column, refused with the place where it is not uniform."""
+    """Spacing of a time column, s; a non-uniform column is refused with the line of the first uneven step."""
     times = finite_series(times, f"{name}, time", lambda at: f"{name}, line {line_of[at]}, time")
     steps = np.diff(times)
     usual = _record_dt(f"{name}, time step", float(np.median(steps)))
@@ -361,8 +364,8 @@ def _uniform_step(name: str, times: Array, line_of: list[int]) -> float:
         raise InvalidInput(
             f"{name}, line {line_of[at + 1]}, time",
             float(times[at + 1]),
-            f"must follow {times[at]:.9g} s by the record's step of {usual:.6g} s",
-            "there is a gap or a change of step: fill it or resample the record evenly",
+            f"must be one time step of {usual:.6g} s after {times[at]:.9g} s",
+            "the record has a gap or a change of time step: resample it with a constant step",
         )
     return dt
 
@@ -380,7 +383,7 @@ def _lines(name: str) -> Iterator[tuple[int, str]]:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        # Old headers name their stations in Latin-1, in which every byte is a letter.
+        # Old headers have station names in Latin-1, which can decode any byte.
         text = content.decode("latin-1")
     for number, line in enumerate(io.StringIO(text, newline=None), start=1):
         if len(line) > MAX_LINE:
@@ -388,13 +391,13 @@ def _lines(name: str) -> Iterator[tuple[int, str]]:
                 f"{name}, line {number}",
                 f"{len(line)} characters",
                 f"must not exceed {MAX_LINE} characters",
-                "this is no record, or its line breaks are lost: export it anew",
+                "it is not a record, or its line breaks are missing: export it again",
             )
         yield number, line
 
 
 def write_at2(path: str | os.PathLike[str], dt: float, acceleration_g: Array, title: str) -> None:
-    """Write PEER's form: four header lines, then 5E15.7 in g."""
+    """Write an .AT2 file as PEER does: four header lines, then accelerations in g in the format 5E15.7."""
     numbers = [f"{value:{AT2_DIGITS + 8}.{AT2_DIGITS}E}" for value in acceleration_g]
     rows = ("".join(numbers[i : i + AT2_COLUMNS]) for i in range(0, len(numbers), AT2_COLUMNS))
     header = (
@@ -407,7 +410,7 @@ def write_at2(path: str | os.PathLike[str], dt: float, acceleration_g: Array, ti
 
 
 def write_csv(path: str | os.PathLike[str], dt: float, acceleration_g: Array, velocity: Array) -> None:
-    """Write time, acceleration and velocity with every digit."""
+    """Write time (s), acceleration (g) and velocity (m/s) with all digits."""
     rows = (
         f"{index * dt!r},{float(a)!r},{float(v)!r}"
         for index, (a, v) in enumerate(zip(acceleration_g, velocity, strict=True))
@@ -420,5 +423,8 @@ def _write(path: str | os.PathLike[str], lines: list[str]) -> None:
         Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
     except OSError as error:
         raise InvalidInput(
-            "motion file", os.fspath(path), f"cannot be written: {error.strerror}", "check folder and rights"
+            "motion file",
+            os.fspath(path),
+            f"cannot be written: {error.strerror}",
+            "check the folder and its permissions",
         ) from error

@@ -1,4 +1,4 @@
-"""The ground motion of a scene."""
+"""Horizontal ground motions."""
 
 from __future__ import annotations
 
@@ -37,31 +37,31 @@ SIGNIFICANT = (0.05, 0.95)
 
 
 class Motion:
-    """A horizontal ground motion, equally spaced in time and immutable.
+    """A horizontal ground motion with constant time step; immutable.
 
-    One quantity is given, the other follows from it: a velocity from an acceleration by the trapezoidal
-    rule (exact for an acceleration straight between samples) from rest; an acceleration from a velocity by
-    central differences.
+    Either acceleration or velocity is given; the other is computed. Velocity follows from acceleration by the
+    trapezoidal rule, starting from rest (exact for an acceleration that is linear between samples).
+    Acceleration follows from velocity by central differences.
 
     Parameters
     ----------
-    dt : spacing, s
+    dt : time step, s
     acceleration_g : (n,) acceleration in g = 9.81 m/s2, n at least 2
-    velocity : (n,) velocity in m/s; exactly one of the two is given
-    kind : where the motion is one of: "outcrop" (free surface of the rock; twice the upgoing wave),
-        "within" (at depth: up- and downgoing waves together) or "upgoing" (the upgoing wave alone)
+    velocity : (n,) velocity, m/s. Exactly one of acceleration_g and velocity is given
+    kind : "outcrop" (free surface of the rock: twice the upgoing wave), "within" (at depth: sum of upgoing
+        and downgoing waves) or "upgoing" (the upgoing wave alone)
 
     Attributes
     ----------
     dt, kind : as given
-    quantity : "acceleration_g" or "velocity": which one was given
-    source : arguments that make the same motion again, as a scene file writes them, or None
-        if it was given by numbers or transformed
+    quantity : "acceleration_g" or "velocity": the given one
+    source : arguments that reproduce the motion, as written to a scene file; None for a motion given by
+        numbers or a transformed one
 
     Raises
     ------
-    InvalidInput : dt not above 0, fewer than 2 points, a value that is not finite, a peak over 20 g (or 20
-        m/s), unknown kind
+    InvalidInput : dt not above 0, fewer than 2 points, a value that is not finite, a peak above 20 g (or 20
+        m/s), or an unknown kind
     """
 
     dt: float
@@ -82,8 +82,8 @@ class Motion:
             raise InvalidInput(
                 "motion",
                 "neither" if velocity is None else "both",
-                "must have one of acceleration_g and velocity",
-                "the other follows from it",
+                "must have exactly one of acceleration_g and velocity",
+                "the other one is computed from it",
             )
         quantity: Quantity = "velocity" if acceleration_g is None else "acceleration_g"
         samples = velocity if acceleration_g is None else acceleration_g
@@ -104,13 +104,13 @@ class Motion:
         )
 
     @classmethod
-    def _made(cls, source: dict[str, Any], kind: Kind, **given: Any) -> Motion:
+    def _from_source(cls, source: dict[str, Any], kind: Kind, **given: Any) -> Motion:
         motion = cls(kind=kind, **given)
         motion.__dict__["source"] = {**source, "kind": motion.kind}
         return motion
 
     def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"a Motion is immutable: make another one instead of setting {name}")
+        raise AttributeError(f"a Motion is immutable: create a new one instead of setting {name}")
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Motion):
@@ -138,33 +138,44 @@ class Motion:
         column: str | int | None = None,
         kind: Kind = "outcrop",
     ) -> Motion:
-        """Read an .AT2 file (known by its suffix) or else a CSV, to which `unit` and `column` belong."""
+        """Read a PEER .AT2 file, recognised by its suffix, or a CSV file.
+
+        Parameters
+        ----------
+        path : the file
+        unit, column : for CSV only; see :meth:`from_csv`
+        kind : see :class:`Motion`
+
+        Raises
+        ------
+        InvalidInput : see :meth:`from_at2` and :meth:`from_csv`; or `unit` or `column` given for an .AT2 file
+        """
         if Path(path).suffix.lower() != ".at2":
             return cls.from_csv(path, unit=unit, column=column, kind=kind)
         for name, value in (("unit", unit), ("column", column)):
             if value is not None:
                 raise InvalidInput(
-                    name, value, "belongs to a CSV file only", "leave it out: an .AT2 file says it"
+                    name, value, "is only for CSV files", "leave it out: an .AT2 file contains it"
                 )
         return cls.from_at2(path, kind=kind)
 
     @classmethod
     def from_at2(cls, path: str | os.PathLike[str], *, kind: Kind = "outcrop") -> Motion:
-        """Read an acceleration in PEER's .AT2 form.
+        """Read an acceleration from a PEER .AT2 file.
 
-        The header ends with the line that holds the number of points and the spacing, as
-        ``NPTS=   7990, DT=  0.0050 SEC`` or ``7990 .0050 NPTS, DT``; a line before must state the unit
-        (G, CM/S2, M/S2). Numbers may stand in columns of any width.
+        The header ends with the line of the number of points and the time step, such as
+        ``NPTS=   7990, DT=  0.0050 SEC`` or ``7990 .0050 NPTS, DT``. A line before it must contain the unit
+        (G, CM/S2 or M/S2). Columns of numbers may have any width.
 
         Raises
         ------
-        InvalidInput : with file and line: unreadable file, no such header, unit missing or of another
-            quantity, spacing not above 0, a count that differs from NPTS, a value that is no finite
-            number, a peak over 20 g
+        InvalidInput : with file and line: unreadable file, no such header, unit missing or not of an
+            acceleration, time step not above 0, number of values other than NPTS, a value that is not a
+            finite number, or a peak above 20 g
         """
         record = _files.read_at2(path)
         source = {"file": os.fspath(path)}
-        return cls._made(source, kind, dt=record.dt, **{record.quantity: record.samples})
+        return cls._from_source(source, kind, dt=record.dt, **{record.quantity: record.samples})
 
     @classmethod
     def from_csv(
@@ -175,29 +186,31 @@ class Motion:
         column: str | int | None = None,
         kind: Kind = "outcrop",
     ) -> Motion:
-        """Read one column of a CSV with a header row and a time column.
+        """Read one column of a CSV file with a header row and a time column.
 
-        Separated by comma, semicolon or tab; lines that begin with # are passed over. The time column is
-        the one named t or time, else the first; only its even spacing is used.
+        The separator is comma, semicolon or tab. Lines that begin with # are skipped. The time column is the
+        one named t or time, or the first column; it must have a constant step, which is used as `dt`.
 
         Parameters
         ----------
-        unit : "g", "m/s2", "cm/s2" for an acceleration, "m/s" for a velocity; may be left out if the
-            column's name ends with it, as acc_g or velocity_m/s, and must not contradict it
-        column : name of the column, or its number from 0; default the acceleration (with unit="m/s" the
-            velocity), else the first besides time
+        path : the file
+        unit : "g", "m/s2" or "cm/s2" for an acceleration, "m/s" for a velocity. Not needed if the name of the
+            column ends with the unit, as acc_g or velocity_m/s; a contradiction is refused
+        column : name of the column, or its number from 0. Default: the acceleration (the velocity for
+            unit="m/s"), recognised by its name, or the first column other than time
+        kind : see :class:`Motion`
 
         Raises
         ------
-        InvalidInput : with file and line: unreadable file, no header row, unit missing or contradictory,
-            unknown column, uneven time, ragged row, fewer than 2 points, a value that is no finite number, a
-            peak over 20 g or 20 m/s
+        InvalidInput : with file and line: unreadable file, no header row, missing or contradictory unit,
+            unknown column, uneven time, row of another length, fewer than 2 points, a value that is not a
+            finite number, or a peak above 20 g or 20 m/s
         """
         record = _files.read_csv(path, unit, column)
         source: dict[str, Any] = {"file": os.fspath(path), "unit": record.unit}
         if column is not None:
             source["column"] = column
-        return cls._made(source, kind, dt=record.dt, **{record.quantity: record.samples})
+        return cls._from_source(source, kind, dt=record.dt, **{record.quantity: record.samples})
 
     @classmethod
     def ricker(
@@ -211,18 +224,23 @@ class Motion:
     ) -> Motion:
         """Ricker pulse a = pga (1 - 2 s) exp(-s), s = (pi frequency (t - t0))^2, t0 = 1.5 periods.
 
-        Velocity and displacement return to zero.
+        Velocity and displacement are zero at the end.
 
         Parameters
         ----------
-        frequency : of the greatest spectral amplitude, Hz
-        pga_g : peak, reached at the sample t0, g
-        dt : spacing, s; default the smaller of 0.005 s and a hundredth of the period
-        duration : s, at least 2 t0, which is the default
+        frequency : frequency of the largest Fourier amplitude, Hz
+        pga_g : peak acceleration, g, at the sample t0
+        dt : time step, s; default the smaller of 0.005 s and a hundredth of the period
+        duration : duration, s, at least 2 t0; default 2 t0
+        kind : see :class:`Motion`
+
+        Raises
+        ------
+        InvalidInput : a value out of range
         """
         spacing, samples = _generators.ricker(frequency, pga_g, dt, duration)
         given = _given(frequency=frequency, pga_g=pga_g, dt=dt, duration=duration)
-        return cls._made({"ricker": given}, kind, dt=spacing, acceleration_g=samples)
+        return cls._from_source({"ricker": given}, kind, dt=spacing, acceleration_g=samples)
 
     @classmethod
     def synthetic(
@@ -237,23 +255,27 @@ class Motion:
         d5_95: float | None = None,
         kind: Kind = "outcrop",
     ) -> Motion:
-        """Seeded synthetic earthquake, by default like Loma Prieta 1989, Gilroy Array #1, component 090.
+        """Synthetic earthquake, with defaults modelled on Loma Prieta 1989, Gilroy Array #1, component 090.
 
-        White noise in a Saragoni-Hart envelope, through the Kanai-Tajimi ground with the Clough-Penzien
-        high-pass (0.5 Hz) and f_max 25 Hz, baseline corrected and scaled. The same arguments give the
-        same motion.
+        White noise with a Saragoni-Hart envelope is filtered (Kanai-Tajimi ground, Clough-Penzien high-pass
+        at 0.5 Hz and f_max of 25 Hz), baseline corrected and scaled. The same arguments give the same motion.
 
         Parameters
         ----------
-        pga_g : peak acceleration, met exactly, g
-        duration : s; the shaking is strongest after 0.35 of it
-        seed : whole number, 0 or above
-        dt : spacing, s, at most 0.02
-        pgv : peak velocity, m/s, met by choice of the ground frequency; default the record's share of
-            `pga_g`, 0.0730 s (0.34 m/s for 0.47 g)
+        pga_g : peak acceleration, g, met exactly
+        duration : duration, s; the envelope has its peak at 0.35 of it
+        seed : seed of the noise, a whole number, 0 or above
+        dt : time step, s, at most 0.02
+        pgv : peak velocity, m/s; the ground frequency is chosen to meet it. Default: the ratio of the record
+            to PGA, 0.0730 s (0.34 m/s for 0.47 g)
         ground_frequency : Kanai-Tajimi frequency, Hz, instead of `pgv`
-        d5_95 : significant duration of the envelope, s (the motion's own scatters about it); default
-            0.307 of `duration`, the record's 3.68 s for 12 s
+        d5_95 : significant duration of the envelope, s; that of the motion varies around it. Default: 0.307
+            of `duration`, as in the record (3.68 s of 12 s)
+        kind : see :class:`Motion`
+
+        Raises
+        ------
+        InvalidInput : a value out of range, or a `pgv` that no ground frequency gives
         """
         samples = _generators.synthetic(pga_g, duration, seed, dt, pgv, ground_frequency, d5_95)
         given = {
@@ -262,7 +284,7 @@ class Motion:
                 pga_g=pga_g, duration=duration, dt=dt, pgv=pgv, ground_frequency=ground_frequency, d5_95=d5_95
             ),
         }
-        return cls._made({"synthetic": given}, kind, dt=dt, acceleration_g=samples)
+        return cls._from_source({"synthetic": given}, kind, dt=dt, acceleration_g=samples)
 
     # Series
 
@@ -282,34 +304,35 @@ class Motion:
 
     @cached_property
     def displacement(self) -> Array:
-        """(n,) displacement, m: the integral of the velocity straight between samples, as it is applied."""
+        """(n,) displacement, m: integral of the velocity, which is linear between samples, as in a run."""
         return _read_only(integrate(self.velocity, self.dt))
 
     @cached_property
     def time(self) -> Array:
-        """(n,) time of the samples from 0, s."""
+        """(n,) time of the samples, s, from 0."""
         return _read_only(self.dt * np.arange(self._samples.size, dtype=np.float64))
 
     def velocity_at(self, time: npt.ArrayLike) -> Array:
-        """Velocity in m/s at any times (s, any shape): straight between samples, zero outside the record."""
+        """Velocity, m/s, at times in s (any shape): linear between samples, zero outside the record."""
         return np.interp(np.asarray(time, dtype=np.float64), self.time, self.velocity, left=0.0, right=0.0)
 
     def upgoing_velocity(self) -> tuple[float, Array]:
-        """Spacing in s and (n,) velocity in m/s of the upgoing wave, which a compliant base takes.
+        """Time step, s, and (n,) velocity, m/s, of the upgoing wave: the input of a compliant base.
 
-        Half an outcrop motion (the free surface doubles the wave); an upgoing one as it is.
+        It is half of an outcrop motion, because the free surface doubles the wave, or the whole upgoing
+        motion.
 
         Raises
         ------
-        InvalidInput : the motion is "within"
+        InvalidInput : the kind of the motion is "within"
         """
         if self.kind == "within":
             raise InvalidInput(
                 "motion.kind",
                 self.kind,
-                'must be "outcrop" or "upgoing" for a compliant base: a motion within the ground holds the '
-                "downgoing wave too, which the base would send up again",
-                "give the outcrop motion of the same rock, or the upgoing wave alone",
+                'must be "outcrop" or "upgoing" for a compliant base: a motion within the ground contains '
+                "the downgoing wave, which the base would apply as an upgoing wave",
+                "use the outcrop motion of the same rock, or the upgoing wave alone",
             )
         return self.dt, self.velocity if self.kind == "upgoing" else _read_only(0.5 * self.velocity)
 
@@ -317,7 +340,7 @@ class Motion:
 
     @property
     def duration(self) -> float:
-        """Time of the last sample, s."""
+        """Duration, s: the time of the last sample."""
         return self.dt * (self._samples.size - 1)
 
     @cached_property
@@ -332,7 +355,7 @@ class Motion:
 
     @cached_property
     def _husid(self) -> Array:
-        """Arias intensity up to each sample, m/s."""
+        """(n,) Arias intensity up to each sample, m/s."""
         acceleration = self.acceleration_g * STANDARD_GRAVITY
         return integrate(acceleration**2, self.dt) * (math.pi / (2.0 * STANDARD_GRAVITY))
 
@@ -348,7 +371,7 @@ class Motion:
 
     @cached_property
     def d5_95(self) -> float:
-        """Significant duration, s: from 5 to 95 % of the Arias intensity; 0 without motion."""
+        """Significant duration, s: between 5 and 95 % of the Arias intensity; 0 for a motion of zeros."""
         if self.arias == 0.0:
             return 0.0
         begin, end = np.interp(SIGNIFICANT, self._husid / self.arias, self.time)
@@ -360,22 +383,28 @@ class Motion:
         """Pseudo-acceleration spectrum; see :func:`response_spectrum`. Default 200 periods, 0.01 to 10 s."""
         return response_spectrum(self.acceleration_g, self.dt, periods, damping)
 
-    # Transformations: each gives a new motion
+    # Transformations: each returns a new motion
 
     def _changed(self, samples: Array) -> Motion:
         given: dict[str, Any] = {self.quantity: samples}
         return Motion(dt=self.dt, kind=self.kind, **given)
 
     def scaled(self, *, pga_g: float | None = None, factor: float | None = None) -> Motion:
-        """Multiplied so that the peak is `pga_g`, or by `factor` (finite)."""
+        """The motion scaled to the peak acceleration `pga_g`, g, or multiplied by `factor`.
+
+        Raises
+        ------
+        InvalidInput : not exactly one of the two, `pga_g` not above 0 or `factor` not finite, or a motion of
+            zeros
+        """
         if (pga_g is None) == (factor is None):
-            raise InvalidInput(
-                "scaled(pga_g, factor)", (pga_g, factor), "exactly one of the two must be given"
-            )
+            raise InvalidInput("scaled(pga_g, factor)", (pga_g, factor), "must be exactly one of the two")
         if pga_g is not None:
-            pga_g = positive("scaled(pga_g)", pga_g, "g", "to reverse the motion use flipped()")
+            pga_g = positive("scaled(pga_g)", pga_g, "g", "use flipped() to reverse the motion")
             if self.pga_g == 0.0:
-                raise InvalidInput("scaled(pga_g)", pga_g, "cannot be reached: the motion is zero throughout")
+                raise InvalidInput(
+                    "scaled(pga_g)", pga_g, "cannot be reached: all values of the motion are 0"
+                )
             factor = pga_g / self.pga_g
         if factor is None or not math.isfinite(factor):
             raise InvalidInput("scaled(factor)", factor, "must be a finite number")
@@ -386,10 +415,10 @@ class Motion:
         return self.scaled(factor=-1.0)
 
     def baseline_corrected(self) -> Motion:
-        """With velocity and displacement zero at the end and the squared velocity least.
+        """The motion after baseline correction, with zero velocity and displacement at the end.
 
-        A polynomial of degree 3 is taken from the acceleration (Berg and Housner 1961, with the end
-        conditions as constraints), and its integral from the velocity.
+        A polynomial of degree 3 is subtracted from the acceleration, and its integral from the velocity. It
+        minimises the squared velocity under the two end conditions (after Berg and Housner 1961).
         """
         acceleration, velocity = baseline(self.velocity, self.dt)
         if self.quantity == "velocity":
@@ -397,39 +426,57 @@ class Motion:
         return self._changed(self._samples - acceleration / STANDARD_GRAVITY)
 
     def filtered(self, low: float | None = None, high: float | None = None, *, order: int = 4) -> Motion:
-        """Frequencies from `low` to `high` (Hz) alone; either may be left out.
+        """The motion after a zero-phase Butterworth filter.
 
-        Butterworth of `order`, forwards and backwards: no delay, 6 dB down at each corner. The record is
-        padded by zeros and cut back to its length, so that after a high-pass a little velocity may be left
-        at the end: `baseline_corrected` takes it away.
+        The filter runs forwards and backwards, so it causes no delay and is 6 dB down at each corner. The
+        record is padded with zeros and then cut to its original length. A high-pass may therefore leave a
+        small velocity at the end, which `baseline_corrected` removes.
+
+        Parameters
+        ----------
+        low, high : corner frequencies, Hz; frequencies below `low` and above `high` are removed. One of the
+            two may be left out
+        order : order of the filter
+
+        Raises
+        ------
+        InvalidInput : no corner frequency, one that is not below the Nyquist frequency, or `low` not below
+            `high`
         """
         return self._changed(butterworth(self._samples, self.dt, low, high, order))
 
     def deconvolved(self, profile: SiteProfile, **options: Any) -> Motion:
-        """The outcrop motion at the base of the ground on which this one was recorded.
+        """The outcrop motion at the base of the ground profile on which this motion was recorded.
 
-        By equivalent-linear analysis; :func:`sandboil.site.deconvolution` takes the same arguments and tells
-        strains and stiffnesses too. The record counts as taken at the surface unless `at="base"`.
+        By equivalent-linear analysis. :func:`sandboil.site.deconvolution` has the same arguments and also
+        returns strains and stiffnesses. The motion was recorded at the surface of the profile unless
+        `at="base"`.
 
-        Warns with :class:`DeconvolutionWarning` where the motion is doubtful. Raises :class:`InvalidInput`.
+        Warns
+        -----
+        DeconvolutionWarning : the result is doubtful
+
+        Raises
+        ------
+        InvalidInput : see :func:`sandboil.site.deconvolution`
         """
-        # The analysis needs motions: they know of it only when asked for it.
+        # Imported here because the analysis itself imports this module.
         from ..site import DeconvolutionWarning, deconvolution
 
         found = deconvolution(self, profile, **options)
-        for doubt in found.doubts:
-            warnings.warn(doubt, DeconvolutionWarning, stacklevel=2)
+        for reason in found.doubts:
+            warnings.warn(reason, DeconvolutionWarning, stacklevel=2)
         return found.motion
 
     # Files
 
     def write_at2(self, path: str | os.PathLike[str]) -> None:
-        """Write the acceleration in PEER's .AT2 form: g, eight significant digits, the kind in the title."""
+        """Write the acceleration to a PEER .AT2 file: in g, eight significant digits, kind in the title."""
         title = f"GROUND MOTION WRITTEN BY SANDBOIL, {self.kind.upper()}"
         _files.write_at2(path, self.dt, self.acceleration_g, title)
 
     def write_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write time_s, acceleration_g and velocity_m/s with every digit."""
+        """Write a CSV file with the columns time_s, acceleration_g and velocity_m/s, with all digits."""
         _files.write_csv(path, self.dt, self.acceleration_g, self.velocity)
 
 

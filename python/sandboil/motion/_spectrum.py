@@ -1,4 +1,4 @@
-"""Response spectrum of a damped oscillator, exact for an acceleration straight between its samples."""
+"""Response spectrum of a damped oscillator, exact for an acceleration that is linear between its samples."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from scipy.signal import lfilter
 from .._errors import InvalidInput
 from ._series import Array, finite_series, positive
 
-# Periods taken when none are given, s: the span of design spectra, log-spaced, enough for a smooth curve.
+# Default periods, s: the range of design spectra, logarithmically spaced, enough for a smooth curve.
 DEFAULT_PERIODS: Array = np.geomspace(0.01, 10.0, 200)
 DEFAULT_PERIODS.flags.writeable = False
-# Response values looked at in each period: a peak between them is missed by at most 1 - cos(pi/20) = 1.2 %.
+# Computed values of the response per period: a peak between them is underestimated by at most 1 - cos(pi/20)
+# = 1.2 %.
 SAMPLES_PER_PERIOD = 20
-# Most response values looked at in one time step: an oscillator stiffer than that follows the ground.
+# Largest number of computed values in one time step: a stiffer oscillator moves with the ground.
 MAX_SUBSTEPS = 40
-# |mu| below which (exp(mu) - 1 - mu)/mu^2 is summed as a series: it cancels otherwise.
+# |mu| below which (exp(mu) - 1 - mu)/mu^2 is summed as a series, to avoid cancellation.
 SERIES_BELOW = 1.0
-# Terms of that series: 1/(18 + 2)! is below the rounding of a double.
+# Number of terms of that series: 1/(18 + 2)! is below the round-off of a double.
 SERIES_TERMS = 18
 
 
@@ -33,7 +34,7 @@ class ResponseSpectrum:
     ----------
     periods : (m,) natural periods, s
     psa_g : (m,) pseudo-spectral acceleration (2 pi/T)^2 max|relative displacement|, g
-    damping : fraction of critical
+    damping : damping ratio, fraction of critical
     """
 
     periods: Array
@@ -47,19 +48,19 @@ def response_spectrum(
     periods: npt.ArrayLike | None = None,
     damping: float = 0.05,
 ) -> ResponseSpectrum:
-    """Pseudo-acceleration spectrum of a base acceleration, the oscillator at rest at its first sample.
+    """Pseudo-acceleration spectrum of a base acceleration, for an oscillator initially at rest.
 
-    Duhamel's integral is summed exactly for the acceleration straight between samples (the solution of
-    Nigam and Jennings 1969, in its complex form). Short periods are looked at between the samples too, and
-    the free vibration after the record counts.
+    Duhamel's integral is exact for an acceleration that is linear between samples (the solution of Nigam and
+    Jennings 1969, in complex form). For short periods the response is also computed between the samples. The
+    free vibration after the record is included.
 
     Parameters
     ----------
     acceleration_g : (n,) base acceleration, g
-    dt : sample spacing, s
-    periods : (m,) s, each at least 0 (at 0 the spectrum is the peak ground acceleration); default
-        200 from 0.01 to 10 s
-    damping : fraction of critical, in [0, 1)
+    dt : time step, s
+    periods : (m,) natural periods, s, 0 or above (at 0 the spectrum is the peak ground acceleration); default
+        200 values from 0.01 to 10 s
+    damping : damping ratio, fraction of critical, in [0, 1)
 
     Raises
     ------
@@ -71,7 +72,7 @@ def response_spectrum(
         raise InvalidInput("damping", damping, "must lie in [0, 1)", "5 % of critical is written 0.05")
     natural = np.array(DEFAULT_PERIODS if periods is None else periods, dtype=np.float64)
     if natural.ndim != 1 or natural.size == 0 or not np.all(np.isfinite(natural) & (natural >= 0.0)):
-        raise InvalidInput("periods", periods, "must be a list of finite periods in s, none negative")
+        raise InvalidInput("periods", periods, "must be a list of finite periods, s, 0 or above")
     psa = np.array([_pseudo_acceleration(ground, dt, float(period), float(damping)) for period in natural])
     return ResponseSpectrum(natural, psa, float(damping))
 
@@ -99,14 +100,14 @@ def _pseudo_acceleration(ground: Array, dt: float, period: float, damping: float
     early = (np.exp(mu) - 1.0) / mu - late
     forcing = -step * (early * ground[:-1] + late * ground[1:])
     response = lfilter([1.0], [1.0, -np.exp(mu)], forcing)
-    # The free vibration y exp(lambda t) is greatest where Im(lambda y exp(lambda t)), its rate, is first 0.
+    # Free vibration y exp(lambda t): its first peak is where the rate Im(lambda y exp(lambda t)) is first 0.
     to_peak = -np.angle(root * response[-1]) % math.pi
     free = response[-1] * np.exp(root / damped * to_peak)
     return float(omega / damped * max(np.max(np.abs(response.imag)), abs(free.imag)))
 
 
 def _phi2(mu: complex) -> complex:
-    """(exp(mu) - 1 - mu)/mu^2, the weight of the later end of a straight forcing."""
+    """(exp(mu) - 1 - mu)/mu^2: the weight of the value at the end of a step of a linear forcing."""
     if abs(mu) >= SERIES_BELOW:
         return complex((np.exp(mu) - 1.0 - mu) / mu**2)
     total = 0.0 + 0.0j

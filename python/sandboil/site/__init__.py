@@ -1,4 +1,4 @@
-"""Level ground as equivalent-linear analysis sees it, and deconvolution of motions to its base.
+"""Profiles of level ground for equivalent-linear analysis, and deconvolution of motions to their base.
 
 Theory and sources: docs/theory/motion.md.
 """

@@ -25,23 +25,24 @@ from ._profile import SiteProfile
 Complex = npt.NDArray[np.complex128]
 Place = Literal["surface", "base"]
 
-# Frequency up to which a motion is deconvolved unless it is given, Hz: it holds what structures feel, and
-# faster waves, which damping amplifies most on the way down, are largely noise.
+# Default cut-off frequency, Hz. It includes the frequencies that matter for structures. Above it a record is
+# largely noise, which deconvolution through damped ground amplifies most.
 DEFAULT_MAX_FREQUENCY = 20.0
-# Waves above the cut fall to nothing by a cosine up to this many times its frequency.
+# Above the cut-off frequency, amplitudes decrease as a cosine and are zero at this many times the frequency.
 CUT_WIDTH = 1.25
-# Spectra are taken of the record with quiet time of twice its length: what arrives before its beginning or
-# after its end then does not come back at the other side.
+# Length of the padded record over its own length. The zeros prevent a motion that arrives before the
+# beginning or after the end of the record from wrapping around to the other end.
 PADDED_LENGTH = 3
 
-# Limits beyond which a deconvolution is doubtful and says so.
-# Largest shear strain, 1: equivalent-linear and nonlinear analyses part between 0.04 and 1 %, by what is
-# asked of them (Carlton and Tokimatsu 2016).
+# Limits beyond which a deconvolution is reported as doubtful.
+# Largest shear strain, 1. Equivalent-linear and nonlinear analyses begin to differ between 0.04 and 1 %,
+# depending on the result considered (Carlton and Tokimatsu 2016).
 STRAIN_LIMIT = 0.005
-# Largest amplification on the way down: undamped ground on a stiffer base has none. Beyond this, fast waves
-# of the base motion tell more of the damping assumed, and of the record's noise, than of the earthquake.
+# Largest amplification from the record to the base motion. Undamped ground on a stiffer base has none. Above
+# this limit, high frequencies of the base motion depend mainly on the assumed damping and on noise of the
+# record.
 AMPLIFICATION_LIMIT = 3.0
-# Largest share of the squared motion that lies before the record's beginning or after its end.
+# Largest share of the squared motion before the beginning or after the end of the record.
 LOST_LIMIT = 0.01
 
 
@@ -51,20 +52,21 @@ class DeconvolutionWarning(SandboilWarning):
 
 @dataclass(frozen=True)
 class Deconvolution:
-    """A motion at the base of a profile, and how it was found. As text, a page for people.
+    """Result of :func:`deconvolution`: the base motion, and the state of the ground. `str` gives a report.
 
     Attributes
     ----------
-    motion : of the outcrop of the half-space, with the record's spacing and length
+    motion : outcrop motion of the half-space, with the time step and length of the record
     profile : the ground
     strain : (m,) largest engineering shear strain in the middle of each layer, 1
-    G_ratio : (m,) shear modulus over that at small strain
-    damping : (m,) ratio
-    iterations : analyses made
-    converged : whether the last one left the stiffness as it was
-    amplification : largest ratio of the base motion to the record's up to the cut
-    amplified_frequency : where it is, Hz
-    lost : share of the squared motion that lies outside the record's time
+    G_ratio : (m,) shear modulus over that at small strain, 1
+    damping : (m,) damping ratio, 1
+    iterations : number of analyses
+    converged : whether stiffness and damping agree with the strains within the tolerance
+    amplification : largest ratio of the Fourier amplitudes of the base motion to those of the record, up to
+        the cut-off frequency
+    amplified_frequency : frequency of the largest amplification, Hz
+    lost : share of the squared base motion outside the time of the record, which `motion` does not contain
     """
 
     motion: Motion
@@ -80,8 +82,8 @@ class Deconvolution:
 
     @property
     def doubts(self) -> list[str]:
-        """Why the motion is not to be trusted; empty if there is no reason known."""
-        told = [
+        """Reasons why the motion is doubtful; empty if there are none."""
+        reasons = [
             (
                 not self.converged,
                 f"stiffness and strain do not agree after {self.iterations} iterations",
@@ -93,16 +95,16 @@ class Deconvolution:
             ),
             (
                 self.amplification > AMPLIFICATION_LIMIT,
-                f"waves of {self.amplified_frequency:.3g} Hz are amplified {self.amplification:.3g} times on "
-                "the way down, and noise with them: lower max_frequency",
+                f"waves of {self.amplified_frequency:.3g} Hz, and their noise, are amplified "
+                f"{self.amplification:.3g} times: lower max_frequency",
             ),
             (
                 self.lost > LOST_LIMIT,
                 f"{100.0 * self.lost:.2g} % of the squared motion lies before or after the record, which "
-                f"needs {self.profile.travel_time:.2g} s of quiet at both ends",
+                f"needs {self.profile.travel_time:.2g} s of zeros at both ends",
             ),
         ]
-        return [why for doubtful, why in told if doubtful]
+        return [reason for doubtful, reason in reasons if doubtful]
 
     def __str__(self) -> str:
         lines = [
@@ -115,7 +117,7 @@ class Deconvolution:
                     self.profile.depth, self.strain, self.G_ratio, self.damping, strict=True
                 )
             ),
-            *(f"doubtful: {why}" for why in self.doubts),
+            *(f"doubtful: {reason}" for reason in self.doubts),
         ]
         return "\n".join(lines)
 
@@ -138,31 +140,33 @@ def deconvolution(
     tolerance: Annotated[Number, Field(gt=0.0, lt=1.0)] = 0.01,
     max_iterations: Annotated[int, Field(strict=True, ge=1)] = 50,
 ) -> Deconvolution:
-    """The outcrop motion of a profile's half-space that belongs to a motion recorded on or in the profile.
+    """Outcrop motion of the half-space of a profile, from a motion recorded at its surface or base.
+
+    Equivalent-linear analysis of vertical shear waves (Schnabel, Lysmer and Seed 1972).
 
     Parameters
     ----------
-    motion : the record; its kind tells which waves it holds
+    motion : the record; its kind defines which waves it contains
     profile : the ground below the instrument
-    at : where it was recorded: at the ground "surface" of the profile or at its "base"
-    linear : keep the stiffness and damping of small strain
-    max_frequency : Hz, at most half the sampling rate; faster waves are taken away. Default 20 Hz, or half
-        the sampling rate where that is lower
-    strain_ratio : strain at which stiffness and damping are taken, over the largest in time
-    tolerance : relative change of the complex stiffness of any layer at which iteration ends
-    max_iterations : analyses made at most
+    at : place of the record: the "surface" of the profile or its "base"
+    linear : use stiffness and damping at small strain, without iteration
+    max_frequency : cut-off frequency, Hz, at most half the sampling rate; higher frequencies are removed.
+        Default 20 Hz, or half the sampling rate if that is lower
+    strain_ratio : effective strain, at which stiffness and damping are computed, over the largest strain
+    tolerance : largest relative change of the complex stiffness of any layer at which the iteration ends
+    max_iterations : largest number of analyses
 
     Raises
     ------
-    InvalidInput : an option out of range, a motion shorter than a wave takes through the profile, or a base
-        motion beyond what an earthquake can be
+    InvalidInput : an option out of range, a motion shorter than the travel time of a wave through the
+        profile, or a base motion beyond that of any earthquake
     """
     if motion.duration <= profile.travel_time:
         raise InvalidInput(
             "site.deconvolution.motion.duration",
             motion.duration,
-            f"must exceed the {profile.travel_time:.4g} s that a shear wave takes through the profile",
-            "take the whole record, and check the units of thickness (m) and Vs (m/s)",
+            f"must exceed the travel time of a shear wave through the profile, {profile.travel_time:.4g} s",
+            "use the whole record, and check the units of thickness (m) and Vs (m/s)",
         )
     cut = _cut(motion, max_frequency)
     samples: Array = getattr(motion, motion.quantity)
@@ -182,7 +186,7 @@ def deconvolution(
         with np.errstate(divide="ignore", invalid="ignore"):
             to_base = 2.0 * up[-1] / record
         if not np.isfinite(to_base).all():
-            raise _excessive(motion, cut, "waves grow beyond any number")
+            raise _excessive(motion, cut, "amplitudes too large to compute")
         strain = np.array(
             [
                 np.abs(irfft(velocity / record * of_layer, size)[: samples.size]).max()
@@ -221,14 +225,14 @@ def deconvolution(
 
 
 def _cut(motion: Motion, max_frequency: float | None) -> float:
-    """Frequency of the cut, Hz, checked against the record's sampling."""
+    """Cut-off frequency, Hz, checked against the sampling rate of the record."""
     nyquist = 0.5 / motion.dt
     if max_frequency is not None and max_frequency > nyquist:
         raise InvalidInput(
             "site.deconvolution.max_frequency",
             max_frequency,
             f"must be at most the Nyquist frequency 1/(2 dt) = {nyquist:.6g} Hz",
-            "the record holds no faster waves",
+            "the record contains no higher frequencies",
         )
     return min(DEFAULT_MAX_FREQUENCY, nyquist) if max_frequency is None else max_frequency
 
@@ -237,26 +241,26 @@ def _excessive(motion: Motion, cut: float, found: str) -> InvalidInput:
     return InvalidInput(
         "site.deconvolution.motion",
         motion,
-        f"must be one that this ground can carry up to {cut:g} Hz; found {found}",
-        "lower max_frequency or scale the motion down; check the profile's units, damping and curves",
+        f"must be one that this ground can carry up to {cut:g} Hz; the analysis gives {found}",
+        "lower max_frequency or scale the motion down; check units, damping and curves of the profile",
     )
 
 
 def _weakest(profile: SiteProfile, strain: Array) -> str:
-    """The largest strain and its depth in words."""
+    """The largest strain and its depth, as text."""
     weakest = int(np.argmax(strain))
-    return f"{100.0 * strain[weakest]:.2g} % in {profile.depth[weakest]:.3g} m depth"
+    return f"{100.0 * strain[weakest]:.2g} % at {profile.depth[weakest]:.3g} m depth"
 
 
 def _low_pass(frequency: Array, cut: float) -> Array:
-    """Factor on every wave, (n,): 1 up to the cut (Hz), then falling to 0 as a cosine does."""
+    """Factor on the amplitudes, (n,): 1 up to the cut-off frequency, Hz, then decreasing to 0 as a cosine."""
     over = np.clip((frequency / cut - 1.0) / (CUT_WIDTH - 1.0), 0.0, 1.0)
     passing: Array = 0.5 * (1.0 + np.cos(np.pi * over))
     return passing
 
 
 def _states(profile: SiteProfile, strain: Array) -> Array:
-    """Modulus ratio and damping ratio of the layers at their strains (m,), 1; shape (2, m)."""
+    """Modulus ratio and damping ratio, (2, m), of the layers at their strains (m,), 1."""
     pairs = [layer.at(amplitude) for layer, amplitude in zip(profile.layers, strain.tolist(), strict=True)]
     return np.array(pairs).T
 
@@ -264,8 +268,8 @@ def _states(profile: SiteProfile, strain: Array) -> Array:
 def complex_speed(profile: SiteProfile, G_ratio: Array, damping: Array) -> Complex:
     """Complex shear wave velocity of the layers, m/s, (m,).
 
-    Its square is G/rho (1 - 2 D^2 + 2 i D sqrt(1 - D^2)) for a damping ratio D, of which the absolute value
-    is G/rho whatever the damping.
+    For a damping ratio D its square is G/rho (1 - 2 D^2 + 2 i D sqrt(1 - D^2)), whose absolute value is G/rho
+    for any damping.
     """
     Vs = np.array([layer.Vs for layer in profile.layers])
     speed: Complex = Vs * np.sqrt(G_ratio) * (np.sqrt(1.0 - damping**2) + 1j * damping)
@@ -273,9 +277,10 @@ def complex_speed(profile: SiteProfile, G_ratio: Array, damping: Array) -> Compl
 
 
 def waves(profile: SiteProfile, speed: Complex, frequency: Array) -> tuple[Complex, Complex]:
-    """Up- and downgoing wave at the top of each layer and of the half-space, each (m + 1, n).
+    """Complex amplitudes of the up- and downgoing wave, each (m + 1, n).
 
-    Both are 1 at the surface, which is free. Amplitudes grow as exp(i 2 pi f t).
+    They are those at the top of each layer and of the half-space, and 1 at the free surface. The time
+    dependence is exp(i 2 pi f t).
 
     Parameters
     ----------
@@ -285,7 +290,7 @@ def waves(profile: SiteProfile, speed: Complex, frequency: Array) -> tuple[Compl
     unit_weight = [layer.unit_weight for layer in profile.layers]
     impedance = np.append(unit_weight * speed, profile.base.unit_weight * profile.base.Vs)
     up, down = np.ones((2, len(profile.layers) + 1, frequency.size), dtype=np.complex128)
-    # What overflows is refused by the caller, with the frequency that causes it.
+    # The caller refuses amplitudes that overflow.
     with np.errstate(over="ignore", invalid="ignore"):
         for i, layer in enumerate(profile.layers):
             phase = np.exp(2j * np.pi * frequency * layer.thickness / speed[i])
@@ -299,7 +304,7 @@ def waves(profile: SiteProfile, speed: Complex, frequency: Array) -> tuple[Compl
 def _strains(
     profile: SiteProfile, speed: Complex, up: Complex, down: Complex, frequency: Array
 ) -> Iterator[Complex]:
-    """Shear strain in the middle of each layer over the velocities `up` and `down`, s/m, (n,)."""
+    """Shear strain in the middle of each layer, over the velocity amplitudes `up` and `down`, s/m, (n,)."""
     for i, layer in enumerate(profile.layers):
         phase = np.exp(1j * np.pi * frequency * layer.thickness / speed[i])
         yield (up[i] * phase - down[i] / phase) / speed[i]

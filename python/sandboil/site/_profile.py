@@ -1,4 +1,4 @@
-"""Layers whose stiffness and damping depend on strain: given, or taken from a scene."""
+"""Layers with strain-dependent stiffness and damping, given by the user or derived from a scene."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from ..discretise import Floats, discretise
 from ..materials import Elastic, Material, NonNegative, Positive, PressureElastic
 from ..scene import DEFAULT_LAYER, Scene, Shaking
 
-# Most layers of a profile: the waves of a long record in them fill about 2 GB.
+# Largest number of layers: the waves of a long record in them need about 2 GB of memory.
 MAX_LAYERS = 1000
-# Damping ratios lie below this: at 0.5 a wave falls to a thirtieth within one wavelength.
+# Upper limit of damping ratios: at 0.5, a wave decreases to a thirtieth within one wavelength.
 DAMPING_LIMIT = 0.5
 
 # Atmospheric pressure of Darendeli (2001), kPa.
 _ATMOSPHERE = 101.325
-# Strains at which a published curve is read, 1: the span of the tests behind it, ten a decade.
+# Default strains of a published curve, 1: the range of its tests, ten values per decade.
 _STRAINS = tuple(np.logspace(-6.0, -2.0, 41).tolist())
-# Cycles for which its damping is read: those of a moderate earthquake.
+# Number of cycles for the damping of a published curve: that of a moderate earthquake.
 _CYCLES = 10.0
 
 Damping = Annotated[Number, Field(ge=0.0, lt=DAMPING_LIMIT)]
@@ -37,11 +37,14 @@ _IN_FRACTIONS: JsonDict = {"remedy": "it is a fraction: 5 % of critical is writt
 
 
 class ModulusCurve(Model):
-    """Shear modulus and damping over the amplitude of strain: straight over its logarithm, level beyond."""
+    """Shear modulus and damping as functions of the strain amplitude.
+
+    Values are interpolated linearly in the logarithm of strain, and constant outside the given strains.
+    """
 
     _label: ClassVar[str] = "curve"
 
-    strain: Many[Positive] = Field(min_length=1, description="engineering shear strain, 1, rising")
+    strain: Many[Positive] = Field(min_length=1, description="engineering shear strain, 1, increasing")
     G_ratio: Many[Annotated[Number, Field(gt=0.0, le=1.0)]] = Field(
         min_length=1, description="secant shear modulus over that at small strain"
     )
@@ -54,7 +57,7 @@ class ModulusCurve(Model):
     @model_validator(mode="after")
     def _one_table(self) -> ModulusCurve:
         if any(high <= low for low, high in zip(self.strain, self.strain[1:], strict=False)):
-            raise InvalidInput("curve.strain", self.strain, "must rise from value to value")
+            raise InvalidInput("curve.strain", self.strain, "must be strictly increasing")
         for name in ("G_ratio", "damping"):
             values = getattr(self, name)
             if len(values) != len(self.strain):
@@ -64,7 +67,7 @@ class ModulusCurve(Model):
         return self
 
     def at(self, strain: float) -> tuple[float, float]:
-        """Modulus ratio and damping ratio at an amplitude of strain, 1."""
+        """Modulus ratio and damping ratio at a strain amplitude, 1."""
         at = math.log(max(strain, self.strain[0]))
         strains = np.log(self.strain)
         return float(np.interp(at, strains, self.G_ratio)), float(np.interp(at, strains, self.damping))
@@ -78,20 +81,25 @@ def darendeli(
     *,
     strains: Many[Positive] = _STRAINS,
 ) -> ModulusCurve:
-    """Mean curve of Darendeli (2001) for 10 cycles at 1 Hz.
+    """Mean modulus and damping curve of Darendeli (2001) for 10 cycles at 1 Hz.
 
     Parameters
     ----------
     sigma_m : mean effective stress, kPa
-    plasticity_index : %
-    OCR : overconsolidation ratio
-    strains : (n,) where the curve is read, engineering shear strain, 1
+    plasticity_index : plasticity index, %
+    OCR : overconsolidation ratio, 1
+    strains : (n,) engineering shear strains of the curve, 1
+
+    Raises
+    ------
+    InvalidInput : a value out of range, or a damping ratio above 0.5
     """
     atmospheres, percent = sigma_m / _ATMOSPHERE, 100.0 * np.array(strains)
     reference = (0.0352 + 0.0010 * plasticity_index * OCR**0.3246) * atmospheres**0.3483
     curvature = 0.9190
     ratio = 1.0 / (1.0 + (percent / reference) ** curvature)
-    # Damping of Masing's loops, %, of the hyperbola with curvature 1, and from it that of this one.
+    # Damping of Masing's loops, %, for a hyperbola with curvature 1; then the correction for the actual
+    # curvature.
     logarithm = np.log((percent + reference) / reference)
     loop = 4.0 * (percent - reference * logarithm) * (percent + reference) / percent**2 - 2.0
     masing = 100.0 / math.pi * loop
@@ -105,13 +113,15 @@ def darendeli(
 
 
 def measured(soil: Material, sigma_v0: float, K0: float) -> ModulusCurve:
-    """Curve of a soil model by :func:`sandboil.lab.modulus_reduction`: a second or more of work.
+    """Modulus and damping curve of a soil model by :func:`sandboil.lab.modulus_reduction`.
 
-    Damping of loops so wide that no equivalent-linear analysis can have it counts as the limit.
+    This takes a second or more. Damping ratios above the limit of equivalent-linear analysis, 0.5, are
+    reduced to it.
 
     Parameters
     ----------
-    sigma_v0 : vertical effective stress, kPa
+    soil : the soil model
+    sigma_v0 : vertical effective stress, kPa, compression positive
     K0 : horizontal over vertical effective stress
     """
     test = lab.modulus_reduction(soil, sigma_v0=sigma_v0, K0=K0)
@@ -122,13 +132,13 @@ def measured(soil: Material, sigma_v0: float, K0: float) -> ModulusCurve:
 
 
 class SiteLayer(Model):
-    """A level layer. Without a `curve` it is linear, with `damping`; a curve has a damping of its own."""
+    """A level layer, with strain-dependent stiffness and damping by `curve`, or linear with `damping`."""
 
     _label: ClassVar[str] = "layer"
     _positional: ClassVar[tuple[str, ...]] = ("thickness", "unit_weight", "Vs")
 
     thickness: Positive = Field(description="m")
-    unit_weight: Positive = Field(description="of soil and water together, kN/m3")
+    unit_weight: Positive = Field(description="total unit weight of soil and water, kN/m3")
     Vs: Positive = Field(description="shear wave velocity at small strain, m/s")
     damping: Damping = Field(default=0.0, description="fraction of critical", json_schema_extra=_IN_FRACTIONS)
     curve: ModulusCurve | None = None
@@ -149,17 +159,17 @@ class SiteLayer(Model):
     def _one_damping(self) -> SiteLayer:
         if self.curve is not None and self.damping > 0.0:
             raise InvalidInput(
-                "layer.damping", self.damping, "must be left out with a curve, which has its own"
+                "layer.damping", self.damping, "must be left out with a curve, which contains the damping"
             )
         return self
 
     def at(self, strain: float) -> tuple[float, float]:
-        """Modulus ratio and damping ratio at an amplitude of strain, 1; at strain 0 those of small strain."""
+        """Modulus ratio and damping ratio at a strain amplitude, 1; strain 0 gives those at small strain."""
         return (1.0, self.damping) if self.curve is None else self.curve.at(strain)
 
 
 class HalfSpace(Model):
-    """Elastic rock or soil below the layers, as a compliant base is one."""
+    """Elastic half-space of rock or soil below the layers; a compliant base models the same half-space."""
 
     _label: ClassVar[str] = "half_space"
     _positional: ClassVar[tuple[str, ...]] = ("unit_weight", "Vs")
@@ -173,7 +183,7 @@ class HalfSpace(Model):
 
 
 class SiteProfile(Model):
-    """Layers from the surface down on a half-space, which is as the lowest layer unless it is given."""
+    """Layers from the surface down, on a half-space; its default has the properties of the lowest layer."""
 
     _label: ClassVar[str] = "profile"
     _positional: ClassVar[tuple[str, ...]] = ("layers",)
@@ -197,20 +207,20 @@ class SiteProfile(Model):
 
     @property
     def base(self) -> HalfSpace:
-        """The half-space as given, or else that of the lowest layer's soil at small strain."""
+        """The given half-space, or one with the properties of the lowest layer at small strain."""
         lowest = self.layers[-1]
         return self.half_space or HalfSpace(lowest.unit_weight, lowest.Vs)
 
     @property
     def depth(self) -> Floats:
-        """Middles of the layers below the surface, m, (m,)."""
+        """Depth of the middle of each layer below the surface, m, (m,)."""
         thickness = np.array([layer.thickness for layer in self.layers])
         middles: Floats = np.cumsum(thickness) - 0.5 * thickness
         return middles
 
     @property
     def travel_time(self) -> float:
-        """Of a shear wave of small strain through all layers, s."""
+        """Travel time of a shear wave of small strain through all layers, s."""
         return sum(layer.thickness / layer.Vs for layer in self.layers)
 
 
@@ -222,20 +232,20 @@ def profile(
     curves: CurveChoice = "darendeli",
     thickness: Positive = DEFAULT_LAYER,
 ) -> SiteProfile:
-    """The column of a scene's particles nearest to `x` as a profile; see :meth:`Scene.profile`."""
+    """The profile of the column of particles nearest to `x`; see :meth:`Scene.profile`."""
     x0, _, x1, _ = scene.bounds
-    wanted = 0.5 * (x0 + x1) if x is None else x
-    if not x0 <= wanted <= x1:
+    place = 0.5 * (x0 + x1) if x is None else x
+    if not x0 <= place <= x1:
         raise InvalidInput(
             "scene.profile.x",
             x,
             f"must lie in the section, [{x0:g}, {x1:g}] m",
-            "leave it out for the middle",
+            "leave it out for the middle of the section",
         )
     particles = discretise(scene)
     across, up = particles.position.T
-    distance = np.abs(across - wanted)
-    # Of two columns equally near, the left one.
+    distance = np.abs(across - place)
+    # Of two equally near columns, use the left one.
     nearest = across[distance <= distance.min() + COORDINATE_TOLERANCE].min()
     column = np.flatnonzero(np.abs(across - nearest) <= COORDINATE_TOLERANCE)
     column = column[np.argsort(-up[column])]
@@ -273,7 +283,7 @@ def _small_strain(scene: Scene, region: int, sigma_v: float) -> tuple[float, flo
 
 
 def _curve(scene: Scene, region: int, sigma_v: float, curves: CurveChoice) -> ModulusCurve | None:
-    """Curve of a region's soil; none where the soil model itself is linear."""
+    """Curve of the soil of a region; None for a linear soil model."""
     ground = scene.regions[region]
     if isinstance(ground.material, Elastic | PressureElastic):
         return None
