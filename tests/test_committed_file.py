@@ -1,4 +1,4 @@
-"""A file that can be opened at any moment: it holds what was committed, whatever happens in between."""
+"""A file that contains its last committed state at any moment, also after an interrupted commit."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sandboil._committed_file import CommittedFile, twin_of
 
-# Places and sizes around the pages in which changes are kept.
+# Offsets and sizes, in bytes, over several of the pages in which changes are stored.
 PLACES = st.integers(0, 20_000)
 
 
 class Killed(BaseException):
-    """Stands for the end of a process."""
+    """Simulates the end of the process."""
 
 
 @given(
@@ -33,7 +33,7 @@ class Killed(BaseException):
         max_size=30,
     )
 )
-def test_it_reads_as_written_and_the_disk_holds_what_was_committed(
+def test_reading_returns_what_was_written_and_the_disk_has_the_last_commit(
     tmp_path_factory: pytest.TempPathFactory, calls: list[Any]
 ) -> None:
     path = tmp_path_factory.mktemp("committed") / "file"
@@ -64,14 +64,14 @@ def test_it_reads_as_written_and_the_disk_holds_what_was_committed(
 
 
 def killing_at(number: int, monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
-    """Let the process end at the so-manieth call that changes the disk; tells how many there were."""
-    made = 0
+    """Raise `Killed` at call `number` of those that change the disk; returns a function that counts them."""
+    calls = 0
 
     def watched(call: Callable[..., Any]) -> Callable[..., Any]:
         def watching(*args: Any, **kwargs: Any) -> Any:
-            nonlocal made
-            made += 1
-            if made == number:
+            nonlocal calls
+            calls += 1
+            if calls == number:
                 raise Killed
             return call(*args, **kwargs)
 
@@ -85,11 +85,11 @@ def killing_at(number: int, monkeypatch: pytest.MonkeyPatch) -> Callable[[], int
         (Path, "hardlink_to"),
     ):
         monkeypatch.setattr(owner, name, watched(getattr(owner, name)))
-    return lambda: made
+    return lambda: calls
 
 
 @pytest.mark.parametrize("links", [True, False])
-def test_a_kill_between_any_two_steps_of_a_commit_leaves_a_whole_file(
+def test_a_kill_between_any_two_steps_of_a_commit_leaves_a_complete_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, links: bool
 ) -> None:
     def no_links(*_: Any) -> None:
@@ -119,12 +119,12 @@ def test_a_kill_between_any_two_steps_of_a_commit_leaves_a_whole_file(
                 pass
         if committed and (links or path.exists()):
             with h5py.File(path) as found:
-                # A kill between the exchange of names and the return from it has committed already.
+                # After a kill between renaming and the return from it, the commit is already complete.
                 count = len(found["rows"])
                 assert committed <= count <= committed + 1
                 np.testing.assert_array_equal(found["rows"][:, 0], np.arange(1.0, count + 1.0))
         elif committed:
-            # Without hard links the name may be missing for an instant; both copies are whole.
+            # Without hard links the file may be missing for a moment; its copy is complete.
             with h5py.File(twin_of(path)) as found:
                 assert committed <= len(found["rows"]) <= committed + 1
         file.close()
@@ -132,8 +132,8 @@ def test_a_kill_between_any_two_steps_of_a_commit_leaves_a_whole_file(
     assert number > 15
 
 
-def test_a_new_file_does_not_take_the_place_of_another(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("mine")
+def test_a_new_file_does_not_replace_an_existing_one(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("content")
     with pytest.raises(FileExistsError):
         CommittedFile(tmp_path / "file")
-    assert (tmp_path / "file").read_text() == "mine"
+    assert (tmp_path / "file").read_text() == "content"

@@ -1,10 +1,10 @@
-"""Throws spoilt files at every reader: each must be read or refused as bad input, in bounded time and memory.
+"""Fuzz test of all readers: every damaged file must be read or refused, within limits of time and memory.
 
     python tests/fuzz/fuzz_readers.py --reader toml --inputs 1000000
 
-An input is a good file with some of its bytes, numbers, words and lines changed, doubled, moved or lost; the
-number of an input and the seed make it again. Readers run in a process of their own, so that a crash is found
-like any other fault. What is found is written to `--keep` and printed, and the exit code is 1.
+An input is a valid file in which some bytes, numbers, words or lines are changed, duplicated, moved or
+removed. It can be reproduced from its number and the seed. Readers run in a separate process, so that a crash
+is counted as a fault. Inputs with faults are written to `--keep` and printed; the exit code is then 1.
 """
 
 from __future__ import annotations
@@ -45,15 +45,15 @@ from sandboil._hdf5 import LAYOUT
 from sandboil.materials import material
 from sandboil.simulation import Simulation
 
-# Longest that reading one input may take of the processor's time, s, whatever else the machine does, and how
-# long the parent waits before it ends a process that makes no progress.
+# Largest processor time for one input, s, and elapsed time after which a process without progress is killed,
+# s.
 LIMIT = 10.0
 PATIENCE = 60.0
-# Memory that reading may take beyond what the process has at first, bytes.
+# Largest memory for reading, bytes, in addition to that of the process at its start.
 MEMORY = 1_000_000_000
-# A refusal is to be read by people, characters.
-LONGEST_REFUSAL = 5000
-# Changes of one input at most.
+# Largest length of an error message, characters.
+LONGEST_MESSAGE = 5000
+# Largest number of changes of one input.
 CHANGES = 4
 
 Read = Callable[[Path], object]
@@ -61,9 +61,16 @@ Read = Callable[[Path], object]
 
 @dataclass(frozen=True)
 class Reader:
-    """A reader, good files, the name that it reads them by, and how an input is sealed after it was changed.
+    """A reader and the inputs for it.
 
-    Text is changed as text, TOML half of the time as the tables that it means.
+    Attributes
+    ----------
+    seeds : valid files
+    read : the reader
+    suffix : file name under which an input is read
+    is_text : change text rather than bytes
+    seal : function that completes a changed input, for example with a checksum
+    is_toml : change half of the inputs as tables rather than as text
     """
 
     seeds: list[bytes]
@@ -168,8 +175,8 @@ def changed_text(rng: random.Random, text: str, other: str) -> str:
         case 3:
             lines = text.split("\n")
             place = rng.randrange(len(lines))
-            spoilt = [[], [lines[place]] * 2, [lines[rng.randrange(len(lines))], lines[place]]]
-            lines[place : place + 1] = rng.choice(spoilt)
+            replacements = [[], [lines[place]] * 2, [lines[rng.randrange(len(lines))], lines[place]]]
+            lines[place : place + 1] = rng.choice(replacements)
             return "\n".join(lines)
         case 4:
             begin = rng.randrange(len(other) or 1)
@@ -198,8 +205,8 @@ def changed_bytes(rng: random.Random, content: bytes, other: bytes) -> bytes:
             return content[:at] + bytes([content[at] ^ (1 << rng.randrange(8))]) + content[at + 1 :]
         case 1:
             value = rng.choice((0, 1, -1, 1 << (8 * width - 1), rng.getrandbits(8 * width)))
-            spoilt = (value & ((1 << (8 * width)) - 1)).to_bytes(width, "little")
-            return content[:at] + spoilt + content[at + width :]
+            changed = (value & ((1 << (8 * width)) - 1)).to_bytes(width, "little")
+            return content[:at] + changed + content[at + width :]
         case 2:
             return content[:at]
         case 3:
@@ -228,7 +235,7 @@ VALUES += [
 
 
 def changed_tables(rng: random.Random, tables: dict[str, Any], other: dict[str, Any]) -> None:
-    """Replace, remove, double or misspell one value somewhere in tables; or graft one of others onto them."""
+    """Replace, remove, duplicate or misspell one value in `tables`, or insert one of those of `other`."""
     part: Any = tables
     while True:
         key = rng.choice(list(part) if isinstance(part, dict) else range(len(part)))
@@ -251,8 +258,8 @@ def changed_tables(rng: random.Random, tables: dict[str, Any], other: dict[str, 
             part[key] = copy.deepcopy(rng.choice(VALUES))
 
 
-def spoilt_toml(rng: random.Random, content: bytes, other: bytes) -> bytes:
-    """A TOML file whose tables were changed."""
+def damaged_toml(rng: random.Random, content: bytes, other: bytes) -> bytes:
+    """A TOML file with changes in its tables."""
     tables, others = (tomllib.loads(text.decode()) for text in (content, other))
     for _ in range(rng.randint(1, CHANGES)):
         if tables:
@@ -260,12 +267,12 @@ def spoilt_toml(rng: random.Random, content: bytes, other: bytes) -> bytes:
     return tomli_w.dumps(tables).encode()
 
 
-def spoilt(reader: Reader, seed: int, number: int) -> bytes:
+def damaged(reader: Reader, seed: int, number: int) -> bytes:
     """Input `number` of a reader."""
     rng = random.Random(seed * 1_000_003 + number)
     content, other = rng.choice(reader.seeds), rng.choice(reader.seeds)
     if reader.is_toml and rng.random() < 0.5:
-        return spoilt_toml(rng, content, other)
+        return damaged_toml(rng, content, other)
     for _ in range(rng.randint(1, CHANGES)):
         if reader.is_text and rng.random() < 0.9:
             text = content.decode("utf-8", "replace"), other.decode("utf-8", "replace")
@@ -339,7 +346,7 @@ SOIL = b'kind = "pm4sand"\nDr = 0.5\nG0 = 600.0\nhpo = 0.4\ne_max = 0.8\n'
 
 
 def _tiny() -> sb.Scene:
-    """Few nodes under water, shaken for a moment."""
+    """A scene with few nodes under water and very short shaking."""
     sand = sb.PM4Sand(Dr=0.55, G0=677.0, hpo=0.4)
     ground = sb.Region("sand", sb.box(x=(0, 1), y=(0, 3)), sand, hydraulic_conductivity=1e-4, Gs=2.67)
     pulse = sb.Motion.ricker(5.0, 0.05)
@@ -360,7 +367,7 @@ def _run() -> sb.Run:
 
 
 def _results(folder: Path) -> bytes:
-    """The results of a run with what its reader asks for, and little else: in few bytes more is spoilt."""
+    """A results file with little more than the data that its reader uses, so that changes affect them."""
     with tempfile.TemporaryDirectory() as made:
         sb.run(_tiny(), Path(made) / "run", threads=1, progress=False)
         path = folder / "few.h5"
@@ -426,13 +433,13 @@ def _state(simulation: Simulation, folder: Path) -> bytes:
 
 
 def _sealed(rng: random.Random, content: bytes) -> bytes:
-    """A state with the checksum of what it has become, mostly: else the checksum were all that is tried."""
-    summed = content[:-4]
-    return summed + struct.pack("<I", zlib.crc32(summed)) if rng.random() < 0.9 else content
+    """A state, in most cases with a valid checksum, so that the test reaches the code after the checksum."""
+    body = content[:-4]
+    return body + struct.pack("<I", zlib.crc32(body)) if rng.random() < 0.9 else content
 
 
 def readers(folder: Path) -> dict[str, Callable[[], Reader]]:
-    """Every reader by its name, with good files made in a folder."""
+    """Every reader by name; its valid files are made in a folder."""
 
     def state() -> Reader:
         simulation = Simulation(_tiny(), threads=1)
@@ -447,7 +454,7 @@ def readers(folder: Path) -> dict[str, Callable[[], Reader]]:
         return Reader([stored], read, "state.state", is_text=False, seal=_sealed)
 
     def results_file() -> Reader:
-        # The scene in a file is the business of another reader, and takes most of the time.
+        # The scene in the file is tested by another reader, and would take most of the time.
         results.Scene = SimpleNamespace(from_toml=cache(sb.Scene.from_toml))  # type: ignore[misc, assignment]
         return Reader([_results(folder)], _read_results, results.FILE_NAME, is_text=False)
 
@@ -478,7 +485,7 @@ def readers(folder: Path) -> dict[str, Callable[[], Reader]]:
 
 
 class Hang(BaseException):
-    """Reading took too long."""
+    """Reading exceeded the time limit."""
 
 
 def _hang(number: int, frame: FrameType | None) -> None:
@@ -486,13 +493,13 @@ def _hang(number: int, frame: FrameType | None) -> None:
 
 
 def outcome(reader: Reader, content: bytes, path: Path) -> str:
-    """How a reader takes an input: "read", "refused", or what is wrong with it."""
+    """Result of reading an input: "read", "refused", or a description of the fault."""
     path.write_bytes(content)
     try:
         reader.read(path)
     except (InvalidInput, DamagedState) as error:
-        told = str(error)
-        return "refused" if len(told) < LONGEST_REFUSAL else f"the refusal has {len(told)} characters"
+        length = len(str(error))
+        return "refused" if length < LONGEST_MESSAGE else f"the error message has {length} characters"
     except Hang:
         return f"still reading after {LIMIT:g} s"
     except BaseException:
@@ -501,44 +508,44 @@ def outcome(reader: Reader, content: bytes, path: Path) -> str:
 
 
 def _limit_memory() -> None:
-    """Bound the memory of this process from here on, where the system tells how much it has."""
-    told = Path("/proc/self/statm")
-    if told.exists():
-        limit = int(told.read_text().split()[0]) * mmap.PAGESIZE + MEMORY
+    """Limit the memory of this process from now on, on systems that report the present memory."""
+    statm = Path("/proc/self/statm")
+    if statm.exists():
+        limit = int(statm.read_text().split()[0]) * mmap.PAGESIZE + MEMORY
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
 
-# Places in the memory that the process which reads shares with the one that waits for it.
+# Indices in the memory that the reading process shares with the waiting process.
 NUMBER, READ, FAULTS = range(3)
 
 
 def _work(reader: Reader, seed: int, inputs: range, shared: Any, keep: Path, path: Path) -> None:
-    """Read inputs one after the other, telling which, and count what came of them."""
+    """Read inputs in order; write the number of each, and the counts of results, to the shared memory."""
     signal.signal(signal.SIGPROF, _hang)
     warnings.simplefilter("ignore")
     _limit_memory()
     for number in inputs:
         shared[NUMBER] = number
-        content = spoilt(reader, seed, number)
+        content = damaged(reader, seed, number)
         signal.setitimer(signal.ITIMER_PROF, LIMIT)
-        told = outcome(reader, content, path)
+        result = outcome(reader, content, path)
         signal.setitimer(signal.ITIMER_PROF, 0.0)
-        if told == "read":
+        if result == "read":
             shared[READ] += 1
-        elif told != "refused":
+        elif result != "refused":
             shared[FAULTS] += 1
-            _report(keep, number, content, told)
+            _report(keep, number, content, result)
 
 
-def _report(keep: Path, number: int, content: bytes, told: str) -> None:
+def _report(keep: Path, number: int, content: bytes, fault: str) -> None:
     keep.mkdir(parents=True, exist_ok=True)
     (keep / f"{number}.input").write_bytes(content)
-    (keep / f"{number}.txt").write_text(told)
-    print(f"input {number}: {told.strip().splitlines()[-1]}", flush=True)
+    (keep / f"{number}.txt").write_text(fault)
+    print(f"input {number}: {fault.strip().splitlines()[-1]}", flush=True)
 
 
 def fuzz(name: str, inputs: int, seed: int, keep: Path) -> dict[str, float]:
-    """Throw inputs at a reader: how many were read and not refused, faults, seconds, largest memory."""
+    """Test a reader; returns numbers of inputs, of files read and of faults, seconds and largest memory."""
     folder = Path(tempfile.mkdtemp(dir="/dev/shm" if Path("/dev/shm").exists() else None))
     start = time.monotonic()
     try:
@@ -555,7 +562,7 @@ def fuzz(name: str, inputs: int, seed: int, keep: Path) -> dict[str, float]:
                 break
             number = shared[NUMBER]
             shared[FAULTS] += 1
-            _report(keep, number, spoilt(reader, seed, number), f"the process ended with {code}")
+            _report(keep, number, damaged(reader, seed, number), f"the process ended with {code}")
             first = number + 1
         memory = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024.0
     finally:
@@ -570,7 +577,7 @@ def fuzz(name: str, inputs: int, seed: int, keep: Path) -> dict[str, float]:
 
 
 def _ended(child: int, shared: Any) -> int:
-    """Exit code of a process, minus the signal it died of; one that makes no progress is killed."""
+    """Exit code of a process, or minus the signal that ended it; a process without progress is killed."""
     before, since = shared[NUMBER], time.monotonic()
     while True:
         ended, status = os.waitpid(child, os.WNOHANG)
@@ -584,21 +591,23 @@ def _ended(child: int, shared: Any) -> int:
 
 
 def main() -> None:
-    """Parse the arguments, throw the inputs, print what came of it."""
+    """Parse the arguments, test the readers and print the results."""
     names = list(readers(Path()))
-    parser = argparse.ArgumentParser(description="Throw spoilt files at the readers.")
+    parser = argparse.ArgumentParser(description="Test the readers with damaged files.")
     parser.add_argument(
-        "--reader", choices=names, action="append", help="one of them; may be repeated; default all"
+        "--reader", choices=names, action="append", help="a reader; may be repeated; default all"
     )
-    parser.add_argument("--inputs", type=int, default=10_000, help="for each reader")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--keep", type=Path, default=Path("fuzz_findings"), help="folder for what is found")
-    asked = parser.parse_args()
+    parser.add_argument("--inputs", type=int, default=10_000, help="number of inputs for each reader")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the random changes")
+    parser.add_argument(
+        "--keep", type=Path, default=Path("fuzz_findings"), help="folder for inputs with faults"
+    )
+    arguments = parser.parse_args()
     faults = 0.0
-    for name in asked.reader or names:
-        told = fuzz(name, asked.inputs, asked.seed, asked.keep / name)
-        print(json.dumps({"reader": name, **told}), flush=True)
-        faults += told["faults"]
+    for name in arguments.reader or names:
+        result = fuzz(name, arguments.inputs, arguments.seed, arguments.keep / name)
+        print(json.dumps({"reader": name, **result}), flush=True)
+        faults += result["faults"]
     sys.exit(1 if faults else 0)
 
 
