@@ -110,7 +110,7 @@ def criterion_of(gamma_sa: float | None, gamma_da: float | None, r_u: float | No
     named = {name: value for name, value in given.items() if value is not None}
     if len(named) > 1:
         raise InvalidInput(
-            "lab.criterion", named, "must be one of gamma_sa, gamma_da and r_u", "leave out all but one"
+            "lab.criterion", named, "must be only one of gamma_sa, gamma_da and r_u", "leave out all but one"
         )
     return named or {"gamma_sa": 0.03}
 
@@ -118,8 +118,7 @@ def criterion_of(gamma_sa: float | None, gamma_da: float | None, r_u: float | No
 def _stop_strain(criterion: dict[str, float]) -> float:
     if "gamma_sa" in criterion:
         return criterion["gamma_sa"]
-    # When the single amplitude reaches the level of a double amplitude, the double amplitude has reached it
-    # too.
+    # The last turn is on the other side of zero, so the double amplitude is at least this single amplitude.
     return max(_GAMMA_STOP, criterion.get("gamma_da", 0.0))
 
 

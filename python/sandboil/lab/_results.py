@@ -139,9 +139,7 @@ class CyclicTest(ShearTest):
         measures = {"r_u": r_u, "gamma_sa": gamma_sa, "gamma_da": gamma_da}
         given = {name: level for name, level in measures.items() if level is not None}
         if len(given) != 1:
-            raise InvalidInput(
-                "cycles_to", given, f"must be given exactly one measure of {', '.join(measures)}"
-            )
+            raise InvalidInput("cycles_to", given, f"must have exactly one measure of {', '.join(measures)}")
         ((name, level),) = given.items()
         if not level > 0.0:
             raise InvalidInput(f"cycles_to.{name}", level, "must be greater than 0")

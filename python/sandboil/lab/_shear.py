@@ -86,7 +86,7 @@ def cyclic_dss(
         raise InvalidInput(
             where,
             given,
-            f"must be given exactly one of {', '.join(loadings)}",
+            f"must have exactly one of {', '.join(loadings)}",
             "csr = 0.15 is a uniform test",
         )
     specimen = consolidated(

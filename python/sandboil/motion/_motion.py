@@ -398,7 +398,9 @@ class Motion:
             zeros
         """
         if (pga_g is None) == (factor is None):
-            raise InvalidInput("scaled(pga_g, factor)", (pga_g, factor), "must be exactly one of the two")
+            raise InvalidInput(
+                "scaled(pga_g, factor)", (pga_g, factor), "must have exactly one of the two values"
+            )
         if pga_g is not None:
             pga_g = positive("scaled(pga_g)", pga_g, "g", "use flipped() to reverse the motion")
             if self.pga_g == 0.0:

@@ -10,8 +10,8 @@ const CORRECTIONS: usize = 60;
 const STRESS_TOLERANCE: f64 = 1e-7;
 /// Stress below which the tolerance is absolute, kPa.
 const LEAST_STRESS: f64 = 1.0;
-/// Largest strain change of one correction, relative to the elastic strain of the increment. It exceeds the plastic
-/// strain of soil that still resists, and keeps a secant extrapolated across a reversal from diverging.
+/// Largest strain change of one correction, relative to the elastic strain of the increment: larger than plastic
+/// strains before failure, and small enough that a secant extrapolated across a reversal does not diverge.
 const TRUST: f64 = 1e3;
 
 /// Which components of `(xx, yy, xy)` have their stress prescribed, and the prescribed values, kPa, tension positive.
