@@ -123,8 +123,8 @@ def test_sand_from_field_tests():
     assert lab.crr(stronger) == pytest.approx(0.16, rel=5e-3)
     # At a larger overburden the resistance is multiplied by K_sigma.
     deep = sb.PM4Sand.from_spt(N160cs=14, sigma_v0=400.0)
-    wanted = correlations.crr_from_spt(14) * correlations.k_sigma(400.0, N160cs=14)
-    assert lab.crr(deep, sigma_v0=400.0) == pytest.approx(wanted, rel=5e-3)
+    expected = correlations.crr_from_spt(14) * correlations.k_sigma(400.0, N160cs=14)
+    assert lab.crr(deep, sigma_v0=400.0) == pytest.approx(expected, rel=5e-3)
 
 
 def test_a_target_where_the_number_of_cycles_jumps_is_met():
