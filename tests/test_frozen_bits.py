@@ -1,0 +1,37 @@
+"""Small scenes give the bits that were frozen; `tests/freeze.py` tells how to freeze others on purpose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import freeze
+import pytest
+from frozen import machine
+from frozen.cases import CASES, computed
+
+# Most entries named in a failure.
+MOST_NAMED = 20
+
+
+@pytest.fixture(scope="module")
+def kept() -> freeze.Entries:
+    """The frozen entries, where this machine can give their bits."""
+    frozen_on, _, entries = freeze.read()
+    other = [name for name, digest in machine.fingerprint().items() if digest != frozen_on.get(name)]
+    if other:
+        pytest.skip(
+            f"the functions of {' and '.join(other)} round otherwise than where the bits were frozen: "
+            "python tests/freeze.py --write with sources that you trust, then compare"
+        )
+    return entries
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_frozen_bits(case: str, kept: freeze.Entries, tmp_path: Path) -> None:
+    found = freeze.entries(case, computed(case, 1, tmp_path))
+    changed = freeze.differences(freeze.of_case(kept, case), found)
+    if changed:
+        _, libraries, _ = freeze.read()
+        named = [f"{name}: {told}" for name, told in changed.items()][:MOST_NAMED]
+        told = f"{len(changed)} of {len(found)} entries differ, frozen with {libraries}, here {machine.libraries()}"
+        pytest.fail("\n".join([told, *named]), pytrace=False)
