@@ -1,11 +1,14 @@
-"""The bits that small scenes have, compared with those that were frozen, or written anew.
+"""Compares the bits of small scenes with those that were frozen, or freezes new ones.
 
-    python tests/freeze.py                         compare, and tell every entry that differs
-    python tests/freeze.py --write                 write all that differs, and tell it
-    python tests/freeze.py --write 'plan: *'       write entries of such names alone
+    python tests/freeze.py                         compare, and name every entry that differs
+    python tests/freeze.py --write                 freeze all entries, and name those that differed
+    python tests/freeze.py --write 'plan: *'       freeze the entries of such names alone
 
 Entries are named `bits: CASE / STAGE / QUANTITY`, and `plan: ...` for sizes and words, which may change while
-the bits stay. `--threads N` computes with so many. A change of bits needs a reason: say it where you write them.
+the bits stay. `--threads N` computes with so many. Bits change for a reason: commit it with them.
+
+A result can have other bits on another processor or with other libraries, where the functions of
+`frozen/machine.py` round otherwise. The test is then skipped: freeze there with sources that you trust first.
 """
 
 from __future__ import annotations
@@ -91,8 +94,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--threads", type=int, default=1)
     options = parser.parse_args(arguments)
     frozen_on, _, kept = read()
-    if frozen_on != (here := machine.fingerprint()):
-        print(f"other functions than where it was frozen: {frozen_on}, here {here}")
+    if frozen_on != machine.fingerprint():
+        print("functions round otherwise here than where the bits were frozen (frozen/machine.py)")
     found: Entries = {}
     for case in CASES:
         with tempfile.TemporaryDirectory() as folder:

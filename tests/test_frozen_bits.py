@@ -6,7 +6,7 @@ from pathlib import Path
 
 import freeze
 import pytest
-from frozen import machine
+from frozen import machine, options, scenes
 from frozen.cases import CASES, computed
 
 # Most entries named in a failure.
@@ -33,5 +33,15 @@ def test_frozen_bits(case: str, kept: freeze.Entries, tmp_path: Path) -> None:
     if changed:
         _, libraries, _ = freeze.read()
         named = [f"{name}: {told}" for name, told in changed.items()][:MOST_NAMED]
-        told = f"{len(changed)} of {len(found)} entries differ, frozen with {libraries}, here {machine.libraries()}"
-        pytest.fail("\n".join([told, *named]), pytrace=False)
+        count = f"{len(changed)} of {len(found)} entries differ"
+        with_libraries = f"frozen with {libraries}, here {machine.libraries()}"
+        pytest.fail("\n".join([f"{count}, {with_libraries}", *named]), pytrace=False)
+
+
+# Options that every scene refuses: a motion within the ground, and rain that falls on no surface.
+REFUSED = {"MotionSpec.kind = within", "Rain.on = base", "Rain.on = left", "Rain.on = right"}
+
+
+def test_scenes_use_every_option(tmp_path: Path) -> None:
+    used = options.used(build(tmp_path) for build in scenes.ALL.values())
+    assert options.schema() - used == REFUSED

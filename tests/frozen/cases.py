@@ -15,6 +15,7 @@ from typing import Any
 
 import sandboil as sb
 from sandboil import lab
+from sandboil.site import deconvolution
 
 from . import scenes
 from .quantities import Found, of_ground, of_run, of_stage, of_test, planned, text_digest, value
@@ -127,7 +128,7 @@ def _resumed(threads: int, folder: Path) -> Result:
     """A run that is interrupted in its first shaking, and resumed."""
     scene, out = scenes.free_field(folder), folder / "run"
     with _interrupted_in("shaking", out), suppress(sb.RunInterrupted):
-        sb.run(scene, out, threads, progress=False)
+        sb.run(scene, out, threads, progress=False, checkpoint_seconds=None, checkpoint_time=0.1)
     run = sb.run(scene, out, threads, progress=False, resume=True)
     assert run.resumed == 1, "it was not interrupted in time"
     return Result(of_run(run))
@@ -233,6 +234,37 @@ def _laboratory(threads: int, folder: Path) -> Result:
     return Result({name: of_test(test) for name, test in tests.items()})
 
 
+def _resistance(threads: int, folder: Path) -> Result:
+    """Cyclic resistance, its curve, and a sand that is calibrated to one."""
+    curve = lab.crr_curve(scenes.LOOSE, csr=[0.12, 0.2])
+    sand = lab.calibrate_hpo(Dr=0.5, G0=600.0, crr=0.14, cycles=5)
+    return Result(
+        {
+            "resistance": {"in 5 cycles": value(lab.crr(scenes.LOOSE, cycles=5.0))},
+            "curve": {name: value(column) for name, column in curve.columns().items()},
+            "calibration": {"hpo": value(sand.hpo)},
+        }
+    )
+
+
+def _site(threads: int, folder: Path) -> Result:
+    """The profile of a scene, and the motion at its base that belongs to one at its surface."""
+    found: Found = {}
+    for curves in ("darendeli", "material"):
+        profile = scenes.level_ground(folder).profile(curves=curves, thickness=4.0)
+        deconvolved = deconvolution(scenes.PULSE, profile)
+        found[curves] = {
+            "unit weight": value([layer.unit_weight for layer in profile.layers]),
+            "shear wave velocity": value([layer.Vs for layer in profile.layers]),
+            "travel time": value(profile.travel_time),
+            "motion": value(deconvolved.motion.acceleration_g),
+            "strain": value(deconvolved.strain),
+            "stiffness": value(deconvolved.G_ratio),
+            "damping": value(deconvolved.damping),
+        }
+    return Result(found)
+
+
 def _shear_cell(threads: int, folder: Path) -> Result:
     """The cell of particles, of sand and of a soil that softens."""
     lattice: dict[str, Any] = {"spacing": 0.02, "size": 0.28, "free_size": 0.08, "max_cycles": 1}
@@ -303,6 +335,8 @@ CASES: dict[str, Case] = {
     "seepage in time, restored": _restored("seepage in time", 100),
     "slope run out, restored": _restored("slope run out", 300),
     "column and wall, restored": _restored("column and wall", 200),
+    "inclined run out, restored": _restored("inclined run out", 300),
+    "moving water, restored": _restored("moving water", 150),
     "corrected, restored": _restored("corrected", 200),
     "undrained pond, read": _read("undrained pond"),
     "dry above water, read": _read("dry above water", accuracy="draft"),
@@ -313,7 +347,9 @@ CASES: dict[str, Case] = {
     "columns read": _columns_read,
     "plan": _plan,
     "laboratory": _laboratory,
+    "resistance": _resistance,
     "shear cell": _shear_cell,
+    "site": _site,
     "motions": _motions,
 }
 

@@ -1,4 +1,4 @@
-"""Scenes that between them use every option there is, each small enough to be computed within a second or two."""
+"""Scenes that between them use every option there is, each computed within a second or two."""
 
 from __future__ import annotations
 
@@ -36,10 +36,12 @@ MEDIUM = sb.PM4Sand(
     p_sed_o=19.0,
 )
 ROCK = sb.Elastic(E=2.0e5, nu=0.3)
+BEDROCK = sb.Elastic(G=8.0e4, K=1.7e5)
 GRAVEL = sb.PressureElastic(G=4.0e4, K=8.0e4, exponent=0.4, p_ref=90.0)
+FILL = sb.PressureElastic(E=6.0e4, nu=0.25)
 CLAY = sb.TotalStress(Su=15.0, Sr=5.0, softening_strain=0.05, G=1.5e4, K=4.0e4)
 SOFT_CLAY = sb.TotalStress(
-    Su=12.0, Sr=6.0, softening_strain=0.1, softening="linear", criterion="von_mises", G=1.2e4, K=3.0e4
+    Su=12.0, Sr=6.0, softening_strain=0.1, softening="linear", criterion="von_mises", E=3.2e4, nu=0.33
 )
 SOFTENING = sb.DruckerPrager(
     c=6.0,
@@ -55,6 +57,7 @@ SOFTENING = sb.DruckerPrager(
     K=4.0e4,
 )
 GRAINS = sb.DruckerPrager(E=840.0, nu=0.3, phi=19.8, c=0.0)
+WEAK_SILT = sb.MohrCoulomb(c=1.0, phi=28.0, G=8.0e3, K=1.7e4)
 SILT = sb.MohrCoulomb(c=5.0, phi=32.0, psi=3.0, tension_cutoff=2.0, E=3.0e4, nu=0.3)
 RETENTION = sb.VanGenuchten(2.0, 2.0, residual_saturation=0.05, full_saturation=0.98)
 
@@ -266,7 +269,7 @@ def free_field(folder: Path) -> sb.Scene:
         stages=[
             sb.Gravity(),
             sb.Shaking(PULSE, base=base),
-            sb.Shaking(PULSE, base=sb.CompliantBase(500.0, 2.2, Vp=900.0), duration=0.2),
+            sb.Shaking(PULSE, base=sb.CompliantBase(500.0, 2.2, Vp=900.0, vertical="roller"), duration=0.2),
         ],
         output=sb.Output(depths=[1.0], points=[(2.0, 2.0)], field_dt=0.25),
     )
@@ -301,12 +304,17 @@ def column_and_wall(folder: Path) -> sb.Scene:
         water_table=sb.WaterTable(elevation=3.0),
         regions=[
             sb.Region(
-                "rock", sb.box(x=(0, 5), y=(0, 1.5)), ROCK, hydraulic_conductivity=1e-6, Gs=2.6, porosity=0.2
+                "rock",
+                sb.box(x=(0, 5), y=(0, 1.5)),
+                BEDROCK,
+                hydraulic_conductivity=1e-6,
+                Gs=2.6,
+                porosity=0.2,
             ),
             sb.Region(
                 "gravel",
                 sb.box(x=(0, 5), y=(1.5, 3)),
-                GRAVEL,
+                FILL,
                 hydraulic_conductivity=1e-2,
                 Gs=2.6,
                 porosity=0.4,
@@ -440,7 +448,7 @@ def slope_run_out(folder: Path) -> sb.Scene:
             sb.Region(
                 "slope",
                 sb.polygon([(0, 0), (10, 0), (10, 2), (7, 2), (4, 4), (0, 4)]),
-                sb.MohrCoulomb(c=1.0, phi=28.0, E=2.0e4, nu=0.3),
+                WEAK_SILT,
                 hydraulic_conductivity=1e-4,
                 retention=sb.VanGenuchten(alpha=2.0, n=2.0),
                 Gs=2.65,
@@ -497,6 +505,174 @@ def flowing_clay(folder: Path) -> sb.Scene:
     )
 
 
+def edges_of_water(folder: Path) -> sb.Scene:
+    """Conditions on every edge, in time and then while the ground moves."""
+    soil = {"hydraulic_conductivity": 1e-4, "retention": RETENTION, "Gs": 2.65, "porosity": 0.4}
+    return sb.Scene(
+        spacing=0.5,
+        water=sb.Water(),
+        water_table=sb.WaterTable(depth=0.0),
+        regions=_column(8.0, [(SILT, 0, 3, soil)]),
+        sides=sb.Roller(),
+        stages=[
+            sb.Seepage(
+                [
+                    sb.Head("surface", head=3.2, x=(0, 2)),
+                    sb.Pressure("surface", pressure=1.0, x=(2, 4)),
+                    sb.Reservoir("surface", level=3.5, x=(4, 6)),
+                    sb.SeepageFace("surface", x=(6, 8)),
+                    sb.Pressure("base", pressure=32.0, x=(0, 2)),
+                    sb.Reservoir("base", level=3.0, x=(3, 5)),
+                    sb.SeepageFace("left"),
+                    sb.Pressure("right", pressure=[(0.0, 20.0), (300.0, 25.0)]),
+                ],
+                duration=600.0,
+            ),
+            sb.Gravity(),
+            sb.Shaking(
+                WEAK_PULSE,
+                duration=0.3,
+                conditions=[
+                    sb.Flux("surface", inflow=1.0e-6),
+                    sb.Flux("right", inflow=-1.0e-6),
+                    sb.SeepageFace("base"),
+                    sb.Pressure("left", pressure=20.0),
+                ],
+            ),
+        ],
+    )
+
+
+def moving_water(folder: Path) -> sb.Scene:
+    """A slope held by suction, shaken in rain beside a rising reservoir; implicit and partly full."""
+    return sb.Scene(
+        spacing=0.5,
+        water=sb.Water(),
+        water_table=sb.WaterTable(elevation=1.5, above="retention"),
+        regions=[
+            sb.Region(
+                "slope",
+                sb.polygon([(0, 0), (8, 0), (8, 1.5), (6, 1.5), (3, 3.5), (0, 3.5)]),
+                LOOSE,
+                hydraulic_conductivity=1e-2,
+                retention=RETENTION,
+                Gs=2.65,
+            )
+        ],
+        sides=sb.Roller(),
+        stages=[
+            sb.Gravity(),
+            sb.Shaking(
+                WEAK_PULSE,
+                duration=0.4,
+                rayleigh=sb.Rayleigh(ratio=0.01, frequencies=(2.0, 10.0)),
+                conditions=[
+                    sb.Reservoir([(8, 1.5), (6, 1.5), (3, 3.5)], level=[(0.0, 1.5), (0.2, 2.5)]),
+                    sb.Rain([(3, 3.5), (0, 3.5)], rate=1.0e-3),
+                ],
+            ),
+        ],
+        output=sb.Output(depths=[1.0]),
+        numerics=sb.Numerics(local_damping=0.05),
+    )
+
+
+def printed_slope(folder: Path) -> sb.Scene:
+    """The printed operators in a dry slope on an uneven base between columns."""
+    return sb.Scene(
+        spacing=0.5,
+        regions=[
+            sb.Region(
+                "slope",
+                sb.polygon([(0, 0), (5, 0.5), (10, 0), (10, 2), (7, 2), (4, 4), (0, 4)]),
+                FILL,
+                dry_unit_weight=17.0,
+            ),
+        ],
+        sides=sb.FreeField(),
+        stages=[sb.Gravity(), sb.Shaking(PULSE, duration=0.5)],
+        output=sb.Output(depths=[1.0]),
+        numerics=sb.Numerics(operators="printed", local_damping=0.05),
+    )
+
+
+def corrected_slope(folder: Path) -> sb.Scene:
+    """Corrected inertia in a wet slope of two soils on an inclined base, with Rayleigh damping."""
+    porous = {"hydraulic_conductivity": 1e-2, "Gs": 2.65, "porosity": 0.4}
+    return sb.Scene(
+        spacing=0.5,
+        water=sb.Water(),
+        water_table=sb.WaterTable(elevation=4.5),
+        regions=[
+            sb.Region("low", sb.polygon([(0, 0), (8, 0.6), (8, 2), (0, 2)]), ROCK, **porous),
+            sb.Region(
+                "high", sb.polygon([(0, 2), (8, 2), (8, 2.5), (5, 2.5), (3, 4), (0, 4)]), SILT, **porous
+            ),
+        ],
+        sides=sb.Roller(),
+        stages=[
+            sb.Gravity(),
+            sb.Shaking(WEAK_PULSE, duration=0.4, rayleigh=sb.Rayleigh(ratio=0.01, frequencies=(2.0, 10.0))),
+        ],
+        output=sb.Output(depths=[1.0]),
+        numerics=sb.Numerics(dispersion_correction=True, diffusion="implicit"),
+    )
+
+
+def inclined_run_out(folder: Path) -> sb.Scene:
+    """Wet sand on an inclined base that absorbs, shaken both ways and then let go at its foot."""
+    return sb.Scene(
+        spacing=0.25,
+        water=sb.Water(),
+        water_table=sb.WaterTable(points=[(0, 1.4), (3, 0.9)], above="dry"),
+        regions=[
+            sb.Region(
+                "sand",
+                sb.polygon([(0, 0.4), (3, 0), (3, 1), (0, 2)]),
+                WEAK_SILT,
+                hydraulic_conductivity=1e-3,
+                Gs=2.65,
+                porosity=0.4,
+            )
+        ],
+        sides=sb.Sides(sb.Fixed(), sb.Roller()),
+        stages=[
+            sb.Gravity(),
+            sb.Shaking(
+                WEAK_PULSE,
+                vertical=WEAK_PULSE,
+                duration=0.3,
+                rayleigh=sb.Rayleigh(ratio=0.02, frequencies=(2.0, 20.0)),
+            ),
+            sb.RunOut(0.3, open_sides=["right"]),
+        ],
+        output=sb.Output(depths=[0.5], field_dt=0.1),
+        numerics=sb.Numerics(velocity_filter=0.1, time_step_factor=0.6),
+    )
+
+
+def repeated_run_out(folder: Path) -> sb.Scene:
+    """A berm that is repeated on both sides and flows, in water that stands nowhere."""
+    return sb.Scene(
+        spacing=0.25,
+        water=sb.Water(),
+        water_table=sb.WaterTable(elevation=1.0, above="retention"),
+        regions=[
+            sb.Region(
+                "clay",
+                sb.polygon([(0, 0), (4, 0), (4, 1), (3, 1), (2.5, 2), (1.5, 2), (1, 1), (0, 1)]),
+                sb.TotalStress(Su=3.0, Sr=1.0, softening_strain=0.1, G=1.5e3, K=4.0e3),
+                hydraulic_conductivity=1e-5,
+                retention=RETENTION,
+                Gs=2.7,
+                porosity=0.5,
+            )
+        ],
+        stages=[sb.Gravity(), sb.RunOut(0.4, still_water=[])],
+        output=sb.Output(field_dt=0.2),
+    )
+
+
 ALL: dict[str, Callable[[Path], sb.Scene]] = {
     build.__name__.replace("_", " "): build
     for build in (
@@ -518,5 +694,11 @@ ALL: dict[str, Callable[[Path], sb.Scene]] = {
         dry_heap,
         wet_heap,
         flowing_clay,
+        edges_of_water,
+        moving_water,
+        printed_slope,
+        corrected_slope,
+        inclined_run_out,
+        repeated_run_out,
     )
 }
