@@ -251,7 +251,7 @@ def _site(threads: int, folder: Path) -> Result:
     """The profile of a scene, and the motion at its base that belongs to one at its surface."""
     found: Found = {}
     for curves in ("darendeli", "material"):
-        profile = scenes.level_ground(folder).profile(curves=curves, thickness=4.0)
+        profile = scenes.explicit_flow(folder).profile(curves=curves, thickness=4.0)
         deconvolved = deconvolution(scenes.PULSE, profile)
         found[curves] = {
             "unit weight": value([layer.unit_weight for layer in profile.layers]),

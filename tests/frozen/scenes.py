@@ -80,7 +80,7 @@ def _column(width: float, soils: Sequence[tuple[Any, float, float, dict[str, Any
 
 def level_ground(folder: Path) -> sb.Scene:
     """Liquefying sand under a pulse, an aftershock, and quiet time; enough nodes for every thread to work."""
-    porous = {"hydraulic_conductivity": 1e-4, "Gs": 2.67}
+    porous: dict[str, Any] = {"hydraulic_conductivity": 1e-4, "Gs": 2.67}
     return sb.Scene(
         spacing=0.25,
         gravity=9.8,
@@ -99,7 +99,11 @@ def level_ground(folder: Path) -> sb.Scene:
 
 def explicit_flow(folder: Path) -> sb.Scene:
     """Explicit diffusion with the water's acceleration, both components of a motion, and every damping."""
-    porous = {"hydraulic_conductivity": 5e-4, "dry_unit_weight": 15.5, "saturated_unit_weight": 19.5}
+    porous: dict[str, Any] = {
+        "hydraulic_conductivity": 5e-4,
+        "dry_unit_weight": 15.5,
+        "saturated_unit_weight": 19.5,
+    }
     sand = sb.PM4Sand(Dr=0.5, G0=600.0, hpo=0.4)
     return sb.Scene(
         spacing=0.25,
@@ -134,7 +138,11 @@ def explicit_flow(folder: Path) -> sb.Scene:
 
 def implicit_flow(folder: Path) -> sb.Scene:
     """Implicit diffusion through layers at an angle to a drain and to a base under pressure."""
-    layered = {"hydraulic_conductivity": sb.Conductivity(2e-3, 5e-4, angle_deg=20.0), "Gs": 2.65, "K0": 0.45}
+    layered: dict[str, Any] = {
+        "hydraulic_conductivity": sb.Conductivity(2e-3, 5e-4, angle_deg=20.0),
+        "Gs": 2.65,
+        "K0": 0.45,
+    }
     return sb.Scene(
         spacing=0.25,
         water=sb.Water(),
@@ -202,7 +210,7 @@ def printed_dry(folder: Path) -> sb.Scene:
 
 def printed_wet(folder: Path) -> sb.Scene:
     """The printed operators with water, explicit and without its acceleration."""
-    porous = {"hydraulic_conductivity": 1e-3, "Gs": 2.67}
+    porous: dict[str, Any] = {"hydraulic_conductivity": 1e-3, "Gs": 2.67}
     return sb.Scene(
         spacing=0.25,
         water=sb.Water(),
@@ -220,7 +228,7 @@ def corrected(folder: Path) -> sb.Scene:
     path = folder / "wave.csv"
     rows = [f"{0.01 * k!r},{0.2 * value!r}" for k, value in enumerate(_wave())]
     path.write_text("\n".join(["t,v", *rows, ""]), encoding="utf-8")
-    porous = {"hydraulic_conductivity": 1e-4, "Gs": 2.67}
+    porous: dict[str, Any] = {"hydraulic_conductivity": 1e-4, "Gs": 2.67}
     return sb.Scene(
         spacing=0.5,
         water=sb.Water(),
@@ -241,7 +249,7 @@ def corrected(folder: Path) -> sb.Scene:
 
 def free_field(folder: Path) -> sb.Scene:
     """A wet slope on an uneven base between two columns, which waves reach at different times."""
-    porous = {"hydraulic_conductivity": 1e-4, "Gs": 2.65}
+    porous: dict[str, Any] = {"hydraulic_conductivity": 1e-4, "Gs": 2.65}
     base = sb.CompliantBase(
         500.0,
         2.2,
@@ -289,7 +297,7 @@ def wall_and_column(folder: Path) -> sb.Scene:
                 sb.MotionSpec(synthetic={"pga_g": 0.2, "duration": 1.0, "seed": 3, "pgv": 0.08}),
                 base=sb.CompliantBase(apparent_velocity=300.0),
                 duration=0.6,
-                rayleigh=sb.Rayleigh(ratio=0.02, frequencies=(3.0, 15.0)),
+                rayleigh=sb.Rayleigh(ratio=0.1, frequencies=(2.0, 4.0)),
             ),
         ],
         output=sb.Output(depths=[1.0]),
@@ -336,7 +344,7 @@ def column_and_wall(folder: Path) -> sb.Scene:
 
 def steady_seepage(folder: Path) -> sb.Scene:
     """Every condition of water on its way to a steady state, and an earthquake in that water."""
-    region = {"retention": RETENTION, "Gs": 2.65, "porosity": 0.4}
+    region: dict[str, Any] = {"retention": RETENTION, "Gs": 2.65, "porosity": 0.4}
     return sb.Scene(
         spacing=0.5,
         water=sb.Water(),
@@ -380,7 +388,7 @@ def steady_seepage(folder: Path) -> sb.Scene:
 
 
 def seepage_in_time(folder: Path) -> sb.Scene:
-    """A reservoir that falls and rain that begins, then shaking with all edges sealed."""
+    """A reservoir that falls, rain, and a sudden inflow, then shaking with all edges sealed."""
     return sb.Scene(
         spacing=0.5,
         water=sb.Water(),
@@ -401,9 +409,9 @@ def seepage_in_time(folder: Path) -> sb.Scene:
                 [
                     sb.Reservoir("right", level=[(0.0, 3.0), (1800.0, 2.0)]),
                     sb.Rain("surface", rate=[(0.0, 0.0), (600.0, 5.0e-6)]),
-                    sb.Flux("left", inflow=[(0.0, 0.0), (900.0, 2.0e-6)]),
+                    sb.Flux("left", inflow=[(0.0, 0.0), (6000.0, 0.0), (6001.0, 2.0e-4)]),
                 ],
-                duration=3600.0,
+                duration=7200.0,
             ),
             sb.Gravity(),
             sb.Shaking(PULSE, duration=0.3, conditions=[]),
@@ -505,9 +513,27 @@ def flowing_clay(folder: Path) -> sb.Scene:
     )
 
 
+def falling_sand(folder: Path) -> sb.Scene:
+    """Loose sand that holds its water and falls apart in air."""
+    return sb.Scene(
+        spacing=0.1,
+        water=sb.Water(bulk_modulus=2.0e4),
+        water_table=sb.WaterTable(depth=0.0),
+        regions=[sb.Region("sand", sb.box(x=(0.0, 0.5), y=(0.0, 0.5)), LOOSE, Gs=2.65)],
+        sides=sb.Roller(),
+        stages=[sb.Gravity(), sb.RunOut(0.08, open_sides=["right"], still_water=[])],
+        output=sb.Output(field_dt=0.1),
+    )
+
+
 def edges_of_water(folder: Path) -> sb.Scene:
     """Conditions on every edge, in time and then while the ground moves."""
-    soil = {"hydraulic_conductivity": 1e-4, "retention": RETENTION, "Gs": 2.65, "porosity": 0.4}
+    soil: dict[str, Any] = {
+        "hydraulic_conductivity": 1e-4,
+        "retention": RETENTION,
+        "Gs": 2.65,
+        "porosity": 0.4,
+    }
     return sb.Scene(
         spacing=0.5,
         water=sb.Water(),
@@ -598,7 +624,7 @@ def printed_slope(folder: Path) -> sb.Scene:
 
 def corrected_slope(folder: Path) -> sb.Scene:
     """Corrected inertia in a wet slope of two soils on an inclined base, with Rayleigh damping."""
-    porous = {"hydraulic_conductivity": 1e-2, "Gs": 2.65, "porosity": 0.4}
+    porous: dict[str, Any] = {"hydraulic_conductivity": 1e-2, "Gs": 2.65, "porosity": 0.4}
     return sb.Scene(
         spacing=0.5,
         water=sb.Water(),
@@ -694,6 +720,7 @@ ALL: dict[str, Callable[[Path], sb.Scene]] = {
         dry_heap,
         wet_heap,
         flowing_clay,
+        falling_sand,
         edges_of_water,
         moving_water,
         printed_slope,
