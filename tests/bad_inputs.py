@@ -22,8 +22,8 @@ import numpy as np
 import sandboil as sb
 import tomli_w
 from sandboil import InvalidInput, cli, lab
-from sandboil.plots import Reference
-from sandboil.simulation import Simulation
+from sandboil.core.simulation import Simulation
+from sandboil.results.plots import Reference
 
 Slip = Callable[[], object]
 Change = Callable[[dict[str, Any]], object]

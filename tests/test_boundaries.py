@@ -31,10 +31,10 @@ from sandboil import (
     WaterTable,
     box,
     discretise,
-    plan,
     polygon,
 )
-from sandboil.simulation import _description, _moving_description, doubts, loaded_motions, probes_of
+from sandboil.core.simulation import _description, _moving_description, doubts, loaded_motions, probes_of
+from sandboil.run import plan
 
 ROCK = Elastic(E=2.0e5, nu=0.3)
 PULSE = Motion.ricker(frequency=4.0, pga_g=0.2)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import sandboil as sb
 from sandboil import InvalidInput
-from sandboil.columns import FILE_NAME
+from sandboil.run.columns import FILE_NAME
 
 MOTION = sb.Motion.ricker(frequency=4.0, pga_g=0.2)
 SAND = sb.PM4Sand(Dr=0.55, G0=677.0, hpo=0.40)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sandboil._committed_file import CommittedFile, twin_of
+from sandboil.files.committed_file import CommittedFile, twin_of
 
 # Offsets and sizes, in bytes, over several of the pages in which changes are stored.
 PLACES = st.integers(0, 20_000)

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from sandboil._errors import InvalidInput
-from sandboil.discretise import discretise
-from sandboil.materials import Elastic, PM4Sand
-from sandboil.scene import Box, Gravity, Polygon, Region, Scene, Water, WaterTable, box, polygon
+from sandboil.ground.discretise import discretise
+from sandboil.scene.scene import Box, Gravity, Polygon, Region, Scene, Water, WaterTable, box, polygon
+from sandboil.scene.soils import Elastic, PM4Sand
 
 GRAVITY = 9.81
 WATER = Water(unit_weight=10.0)

@@ -38,7 +38,7 @@ from sandboil import (
     load,
     run,
 )
-from sandboil.plots import plot, seepage
+from sandboil.results.plots import plot, seepage
 
 EMBANKMENT = Path(__file__).parents[1] / "examples" / "embankment" / "scene.toml"
 SAND = VanGenuchten(alpha=8.0, n=3.0, residual_saturation=0.05)

@@ -300,7 +300,7 @@ def test_the_size_of_files_is_limited(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr("sandboil.motion._files.MAX_SAMPLES", 2)
     with pytest.raises(InvalidInput, match=r"m\.csv, line 4 = 3: must have at most 2 points"):
         Motion.from_csv(path, unit="g")
-    monkeypatch.setattr("sandboil._input_file.MAX_FILE_BYTES", 10)
+    monkeypatch.setattr("sandboil.files.input_file.MAX_FILE_BYTES", 10)
     with pytest.raises(InvalidInput, match="must not exceed 10 bytes"):
         Motion.from_csv(path, unit="g")
 

@@ -8,8 +8,8 @@ import h5py
 import pytest
 import scenes
 from sandboil import Gravity, InvalidInput, Plan, Run, Shaking, Water
-from sandboil import plan as plan_module
-from sandboil.plan import pore_pressure_coefficients
+from sandboil.run import plan as plan_module
+from sandboil.run.plan import pore_pressure_coefficients
 
 
 def grown_bytes(run: Run) -> int:
@@ -25,7 +25,7 @@ def grown_bytes(run: Run) -> int:
 
 @pytest.fixture(autouse=True)
 def short_trial(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sandboil.plan.TRIAL_SECONDS", 0.2)
+    monkeypatch.setattr(plan_module, "TRIAL_SECONDS", 0.2)
 
 
 def test_the_plan_foresees_the_run(finished: Run) -> None:
@@ -80,7 +80,7 @@ def test_a_dry_scene_without_shaking_plans_neither() -> None:
 
 
 def test_a_long_way_to_rest_is_not_foretold(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sandboil.plan.TRIAL_SECONDS", 0.0)
+    monkeypatch.setattr(plan_module, "TRIAL_SECONDS", 0.0)
     plan = scenes.column(stages=[Gravity(tolerance=1e-12)]).plan()
     assert plan.stages[0].steps is None
     assert plan.wall_time is None

@@ -10,7 +10,7 @@ import scenes
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from sandboil import FreeField, Gravity, InvalidInput, Output, Region, Run, polygon, run
-from sandboil.plots import Reference, column, plot, pore_pressure, section, stress_paths, surface
+from sandboil.results.plots import Reference, column, plot, pore_pressure, section, stress_paths, surface
 
 PNG = b"\x89PNG"
 

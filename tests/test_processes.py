@@ -21,7 +21,7 @@ import pytest
 import sandboil as sb
 import scenes
 from sandboil import Gravity, Region, Scene, Shaking, Simulation, box
-from sandboil.simulation import LOOK_INTERVAL
+from sandboil.core.simulation import LOOK_INTERVAL
 
 # Wall time after which a process or thread is taken to hang, s.
 PATIENCE = 120.0

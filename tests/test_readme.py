@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from sandboil import Run, lab
+from sandboil.run import plan
 
 README = Path(__file__).parents[1] / "README.md"
 
@@ -16,7 +17,7 @@ def test_the_python_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monke
     shorter = code.replace("duration=20.0", "duration=1.0").replace("time=10.0", "time=1.0")
     assert shorter.count("=1.0") >= code.count("=1.0") + 2
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("sandboil.plan.TRIAL_SECONDS", 0.2)
+    monkeypatch.setattr(plan, "TRIAL_SECONDS", 0.2)
     names: dict[str, object] = {}
     exec(compile(shorter, README.name, "exec"), names)
     assert isinstance(names["run"], Run)

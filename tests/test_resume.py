@@ -30,13 +30,13 @@ from sandboil import (
     SandboilError,
     Scene,
     load,
-    results,
     run,
 )
-from sandboil import checkpoint as checkpoints
-from sandboil._committed_file import CommittedFile, twin_of
-from sandboil.columns import FILE_NAME as COLUMNS
-from sandboil.results import FILE_NAME
+from sandboil.files.committed_file import CommittedFile, twin_of
+from sandboil.results import reader as results
+from sandboil.results.reader import FILE_NAME
+from sandboil.run import checkpoint as checkpoints
+from sandboil.run.columns import FILE_NAME as COLUMNS
 
 COMMIT_INTERVAL = results._COMMIT_INTERVAL
 HERE = Path(__file__).parent
@@ -45,7 +45,8 @@ HERE = Path(__file__).parent
 RUNNING = """
 import sys, warnings
 import scenes
-from sandboil import results, run
+from sandboil import run
+from sandboil.results import reader as results
 results._COMMIT_INTERVAL = 0.0
 folder, threads, resume = sys.argv[1:]
 warnings.simplefilter("ignore")
@@ -314,7 +315,7 @@ def test_results_that_cannot_be_read_are_those_of_their_twin(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path, length: int
 ) -> None:
     twin = twin_of(tmp_path / FILE_NAME)
-    monkeypatch.setattr("sandboil._committed_file.CommittedFile.close", lambda _: None)
+    monkeypatch.setattr("sandboil.files.committed_file.CommittedFile.close", lambda _: None)
     killed_run(tmp_path, 45, monkeypatch)
     monkeypatch.undo()
     assert twin.exists()

@@ -32,7 +32,8 @@ from sandboil import (
     load,
     run,
 )
-from sandboil.run import with_accuracy
+from sandboil.run import neighbourhood
+from sandboil.run.run import with_accuracy
 
 LEVEL_GROUND = Path(__file__).parents[1] / "examples" / "level_ground"
 
@@ -290,7 +291,7 @@ def test_a_neighbourhood_that_cannot_be_written_hides_no_divergence(
     def full(*_: object) -> None:
         raise OSError("No space left on device")
 
-    monkeypatch.setattr("sandboil._neighbourhood.write", full)
+    monkeypatch.setattr(neighbourhood, "write", full)
     with pytest.raises(SimulationDiverged) as caught:
         run(scenes.diverging_column(), tmp_path)
     assert "No space left" in caught.value.__notes__[-1]

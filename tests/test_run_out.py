@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sandboil as sb
-from sandboil import InvalidInput, plots
+from sandboil import InvalidInput
+from sandboil.results import plots
 
 GRAINS = sb.DruckerPrager(E=840.0, nu=0.3, phi=19.8, c=0.0)
 SPACING = 0.01

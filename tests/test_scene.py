@@ -12,9 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from sandboil._errors import InvalidInput
-from sandboil.materials import Elastic, PM4Sand
 from sandboil.motion import Motion
-from sandboil.scene import (
+from sandboil.scene.scene import (
     REFERENCE_WATER_DENSITY,
     CompliantBase,
     Gravity,
@@ -30,6 +29,7 @@ from sandboil.scene import (
     box,
     polygon,
 )
+from sandboil.scene.soils import Elastic, PM4Sand
 
 LEVEL_GROUND = Path(__file__).parents[1] / "examples" / "level_ground"
 SAND = PM4Sand(Dr=0.55, G0=677.0, hpo=0.40)

@@ -16,27 +16,15 @@ from ._errors import (
     SimulationDiverged,
     SuctionWarning,
 )
-from ._motion_spec import MotionSpec
-from .boundaries import BaseSegment, CompliantBase, Fixed, FreeField, Periodic, Roller, Sides
-from .discretise import Discretisation, discretise
-from .hydraulics import (
-    Conductivity,
-    Drain,
-    Flux,
-    Head,
-    Pressure,
-    Rain,
-    Reservoir,
-    Seepage,
-    SeepageFace,
-    VanGenuchten,
-)
-from .materials import DruckerPrager, Elastic, MohrCoulomb, PM4Sand, PressureElastic, TotalStress
+from .core.simulation import Simulation
+from .ground.discretise import Discretisation, discretise
 from .motion import Motion, ResponseSpectrum, response_spectrum
-from .plan import Plan
-from .results import History, Profile, Run, Summary, Surface, load
-from .run import run
-from .scene import (
+from .results.reader import History, Profile, Run, Summary, Surface, load
+from .run.plan import Plan
+from .run.run import run
+from .scene.edges import BaseSegment, CompliantBase, Fixed, FreeField, Periodic, Roller, Sides
+from .scene.motion_spec import MotionSpec
+from .scene.scene import (
     Box,
     Gravity,
     Numerics,
@@ -52,7 +40,19 @@ from .scene import (
     box,
     polygon,
 )
-from .simulation import Simulation
+from .scene.soils import DruckerPrager, Elastic, MohrCoulomb, PM4Sand, PressureElastic, TotalStress
+from .scene.water import (
+    Conductivity,
+    Drain,
+    Flux,
+    Head,
+    Pressure,
+    Rain,
+    Reservoir,
+    Seepage,
+    SeepageFace,
+    VanGenuchten,
+)
 from .site import HalfSpace, ModulusCurve, SiteLayer, SiteProfile
 
 __all__ = [

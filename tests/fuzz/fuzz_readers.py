@@ -38,12 +38,15 @@ import h5py
 import numpy as np
 import sandboil as sb
 import tomli_w
-from sandboil import _core, checkpoint, columns, plots, results
-from sandboil._cli_lab import _strains
+from sandboil import _core
 from sandboil._errors import DamagedState, InvalidInput
-from sandboil._hdf5 import LAYOUT
-from sandboil.materials import material
-from sandboil.simulation import Simulation
+from sandboil.cli.lab import _strains
+from sandboil.core.simulation import Simulation
+from sandboil.files.hdf5 import LAYOUT
+from sandboil.results import plots
+from sandboil.results import reader as results
+from sandboil.run import checkpoint, columns
+from sandboil.scene.soils import material
 
 # Largest processor time for one input, s, and elapsed time after which a process without progress is killed,
 # s.

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, PlainValidator
 
 from .._model import Number
 from .._model import checked as _checked
-from ..discretise import Floats
+from ..ground.discretise import Floats
 from . import _specimen
 from ._results import ShearTest
 

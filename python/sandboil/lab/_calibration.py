@@ -12,7 +12,7 @@ from pydantic import Field
 
 from .._errors import InvalidInput, SandboilWarning, nearest_name
 from .._model import Number
-from ..materials import PM4Sand
+from ..scene.soils import PM4Sand
 from . import correlations
 from ._arguments import Bias, EarthPressure, Integrator, Limit, Pressure, VoidRatio, checked
 from ._resistance import (

@@ -15,9 +15,9 @@ from pydantic import Field, StrictBool
 from .. import _core
 from .._errors import InvalidInput, SandboilError
 from .._model import Number
-from ..discretise import Floats
-from ..materials import Material
-from ..simulation import LOOK_INTERVAL, MAX_THREADS
+from ..core.simulation import LOOK_INTERVAL, MAX_THREADS
+from ..ground.discretise import Floats
+from ..scene.soils import Material
 from ._arguments import (
     Count,
     EarthPressure,

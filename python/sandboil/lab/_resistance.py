@@ -13,8 +13,8 @@ from pydantic import Field, PlainValidator
 
 from .._errors import InvalidInput
 from .._model import Number
-from ..discretise import Floats
-from ..materials import PM4Sand
+from ..ground.discretise import Floats
+from ..scene.soils import PM4Sand
 from . import correlations
 from ._arguments import (
     Bias,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._errors import InvalidInput
-from ..discretise import Floats
+from ..ground.discretise import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

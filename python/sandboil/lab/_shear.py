@@ -11,8 +11,8 @@ from pydantic import StrictBool
 
 from .. import _core
 from .._errors import InvalidInput
-from ..discretise import Floats
-from ..materials import PM4Sand
+from ..ground.discretise import Floats
+from ..scene.soils import PM4Sand
 from ._arguments import (
     Bias,
     Count,

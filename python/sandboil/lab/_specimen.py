@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from .. import _core
 from .._errors import InvalidInput
-from ..materials import Material, PM4Sand
+from ..scene.soils import Material, PM4Sand
 
 Components = tuple[float, float, float, float]
 

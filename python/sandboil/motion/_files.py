@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from .._errors import InvalidInput, nearest_name
-from .._input_file import read_bytes
+from ..files.input_file import read_bytes
 from ._series import (
     MAX_DT,
     MAX_SAMPLES,

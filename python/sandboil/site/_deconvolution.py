@@ -17,9 +17,9 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from .._errors import InvalidInput, SandboilWarning
 from .._model import Number, checked
-from ..materials import Positive
 from ..motion import Motion
 from ..motion._series import Array
+from ..scene.soils import Positive
 from ._profile import SiteProfile
 
 Complex = npt.NDArray[np.complex128]

@@ -13,10 +13,10 @@ from pydantic.config import JsonDict
 from .. import _core, lab
 from .._errors import InvalidInput
 from .._model import Many, Model, Number, checked
-from ..boundaries import COORDINATE_TOLERANCE, CompliantBase
-from ..discretise import Floats, discretise
-from ..materials import Elastic, Material, NonNegative, Positive, PressureElastic
-from ..scene import DEFAULT_LAYER, Scene, Shaking
+from ..ground.discretise import Floats, discretise
+from ..scene.edges import COORDINATE_TOLERANCE, CompliantBase
+from ..scene.scene import DEFAULT_LAYER, Scene, Shaking
+from ..scene.soils import Elastic, Material, NonNegative, Positive, PressureElastic
 
 # Largest number of layers: the waves of a long record in them need about 2 GB of memory.
 MAX_LAYERS = 1000

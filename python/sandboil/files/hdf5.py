@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ._errors import InvalidInput, SandboilError
+from .._errors import InvalidInput, SandboilError
 
 # Most values per byte of file: deflate makes 1032 bytes of one at most, and we use no other filter that does.
 _MAX_EXPANSION = 1032

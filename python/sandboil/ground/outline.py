@@ -10,8 +10,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from ._errors import InvalidInput
-from .boundaries import COORDINATE_TOLERANCE
+from .._errors import InvalidInput
+from ..scene.edges import COORDINATE_TOLERANCE
 
 Floats = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from . import _core
-from ._errors import InvalidInput
-from .boundaries import COORDINATE_TOLERANCE, Periodic
-from .scene import Scene
+from .. import _core
+from .._errors import InvalidInput
+from ..scene.edges import COORDINATE_TOLERANCE, Periodic
+from ..scene.scene import Scene
 
 Floats = NDArray[np.float64]
 

@@ -19,10 +19,10 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from . import _core
-from ._committed_file import sync_folder
-from ._errors import DamagedState, InvalidInput, ResumeWarning
-from .simulation import OUTPUT, STAGE_PREFIX, Simulation
+from .. import _core
+from .._errors import DamagedState, InvalidInput, ResumeWarning
+from ..core.simulation import OUTPUT, STAGE_PREFIX, Simulation
+from ..files.committed_file import sync_folder
 
 FOLDER_NAME = "checkpoints"
 _SUFFIX = ".state"

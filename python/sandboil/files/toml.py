@@ -9,8 +9,8 @@ from typing import Any
 
 import tomli_w
 
-from ._errors import InvalidInput
-from ._input_file import read_text
+from .._errors import InvalidInput
+from .input_file import read_text
 
 # Most parts of a dotted key: a scene's have six at most, and the parser's memory grows with their square.
 MAX_KEY_PARTS = 16

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from ._errors import InvalidInput
-from ._model import MAX_PARTS, Many, Model, Number
-from ._motion_spec import GivenMotion, MotionSpec
-from .materials import NonNegative, Positive
+from .._errors import InvalidInput
+from .._model import MAX_PARTS, Many, Model, Number
+from .motion_spec import GivenMotion, MotionSpec
+from .soils import NonNegative, Positive
 
 if TYPE_CHECKING:
-    from .motion import Motion
+    from ..motion import Motion
 
 # Coordinates closer than this are the same point, m: far below any spacing, far above round-off of a
 # kilometre-wide section.

@@ -12,14 +12,15 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from . import _toml, lab
-from ._cli_out import picture_to_write, to_write
-from ._errors import InvalidInput, SandboilError
-from ._input_file import read_text
-from ._style import DPI
-from .discretise import Floats
-from .lab._arguments import Integrator
-from .materials import Material, PM4Sand, material
+from .. import lab
+from .._errors import InvalidInput, SandboilError
+from .._style import DPI
+from ..files import toml as _toml
+from ..files.input_file import read_text
+from ..ground.discretise import Floats
+from ..lab._arguments import Integrator
+from ..scene.soils import Material, PM4Sand, material
+from .outputs import picture_to_write, to_write
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

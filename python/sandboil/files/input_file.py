@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ._errors import InvalidInput
+from .._errors import InvalidInput
 
 # Largest file of text taken, bytes: a motion of two million samples fits as rows of three full numbers and as
 # numbers in a scene; what it becomes in memory stays far below that of a usual computer.

@@ -12,18 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from . import _core
-from ._errors import InvalidInput, SandboilError, SandboilWarning, SuctionWarning, nearest_name
-from ._fingerprint import fingerprint
-from .boundaries import Periodic
-from .columns import HANDS, ColumnRecord
-from .columns import INTERVAL as COLUMN_INTERVAL
-from .columns import key as column_key
-from .columns import load as load_columns
-from .discretise import Discretisation, Floats, discretise
-from .hydraulics import Drain, Seepage, series_of
-from .motion import Motion
-from .scene import AnyStage, Gravity, Moving, Region, RunOut, Scene, Shaking
+from .. import _core
+from .._errors import InvalidInput, SandboilError, SandboilWarning, SuctionWarning, nearest_name
+from ..files.fingerprint import fingerprint
+from ..ground.discretise import Discretisation, Floats, discretise
+from ..motion import Motion
+from ..run.columns import HANDS, ColumnRecord
+from ..run.columns import INTERVAL as COLUMN_INTERVAL
+from ..run.columns import key as column_key
+from ..run.columns import load as load_columns
+from ..scene.edges import Periodic
+from ..scene.scene import AnyStage, Gravity, Moving, Region, RunOut, Scene, Shaking
+from ..scene.water import Drain, Seepage, series_of
 
 # How long the core computes before it looks whether the user wants to stop, s.
 LOOK_INTERVAL = 0.1

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 from pydantic.config import JsonDict
 
-from . import _core
-from ._errors import InvalidInput
-from ._model import Model, Number, field_remedy
+from .. import _core
+from .._errors import InvalidInput
+from .._model import Model, Number, field_remedy
 
 _FRACTION: JsonDict = {"remedy": "it is a fraction, not a percentage: 55 % is written 0.55"}
 _NU: JsonDict = {
@@ -165,7 +165,7 @@ class PM4Sand(Model):
     @classmethod
     def _calibrated(cls, measured: dict[str, float], options: dict[str, Any]) -> PM4Sand:
         # The laboratory tests materials, so it cannot be there before them.
-        from .lab import calibrate_hpo, correlations
+        from ..lab import calibrate_hpo, correlations
 
         said = {name: options[name] for name in ("sigma_v0", "crr") if name in options}
         return calibrate_hpo(**(correlations.estimates(**measured, **said) | options))

@@ -16,11 +16,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _core
-from ._committed_file import sync_folder
-from ._errors import InvalidInput
-from ._fingerprint import fingerprint
-from ._hdf5 import LAYOUT, opened, refuse_foreign, said, text
+from .. import _core
+from .._errors import InvalidInput
+from ..files.committed_file import sync_folder
+from ..files.fingerprint import fingerprint
+from ..files.hdf5 import LAYOUT, opened, refuse_foreign, said, text
 
 Floats = NDArray[np.float64]
 

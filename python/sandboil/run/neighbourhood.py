@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ._errors import SimulationDiverged
-from .discretise import Floats
-from .simulation import FIELDS, VECTOR_FIELDS, Simulation
+from .._errors import SimulationDiverged
+from ..core.simulation import FIELDS, VECTOR_FIELDS, Simulation
+from ..ground.discretise import Floats
 
 FILE_NAME = "neighbourhood.csv"
 PICTURE_NAME = "neighbourhood.png"
@@ -73,7 +73,7 @@ def write(folder: Path, simulation: Simulation, error: SimulationDiverged) -> li
         writer.writerow(columns)
         writer.writerows(zip(*(np.asarray(values).tolist() for values in columns.values()), strict=True))
     # As soon as there is something to draw, which hopefully is never: it takes a second to load.
-    from .plots import neighbourhood
+    from ..results.plots import neighbourhood
 
     speed: Floats = np.linalg.norm(fields["velocity"][nodes], axis=1)
     neighbourhood(rest[nodes], speed, fields["sigma_v_eff"][nodes], str(error), paths[1])

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
-from ._errors import InvalidInput, nearest_name
-from ._model import Many, Model, Number
-from .materials import Positive
+from .._errors import InvalidInput, nearest_name
+from .._model import Many, Model, Number
+from .soils import Positive
 
 if TYPE_CHECKING:
-    from .motion import Motion
+    from ..motion import Motion
 
 
 class MotionSpec(Model):
@@ -47,7 +47,7 @@ class MotionSpec(Model):
         """Check the generator's arguments and write its defaults out: the scene then keeps its meaning."""
         if said is None:
             return None
-        from .motion import Motion
+        from ..motion import Motion
 
         generator = str(field.field_name)
         known = dict(inspect.signature(getattr(Motion, generator)).parameters)
@@ -105,7 +105,7 @@ class MotionSpec(Model):
 
     def load(self) -> Motion:
         """The motion itself; :class:`InvalidInput` if its file or its numbers are no motion."""
-        from .motion import Motion
+        from ..motion import Motion
 
         if self.file is not None:
             motion = Motion.from_file(self.file, unit=self.unit, column=self.column, kind=self.kind)
@@ -128,7 +128,7 @@ class MotionSpec(Model):
 def _said(value: object) -> object:
     if value is None or isinstance(value, (dict, MotionSpec)):
         return value
-    from .motion import Motion
+    from ..motion import Motion
 
     return MotionSpec.of(value) if isinstance(value, Motion) else value
 

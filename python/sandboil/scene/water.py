@@ -17,11 +17,11 @@ from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 from pydantic.config import JsonDict
 from shapely.geometry.base import BaseGeometry
 
-from ._errors import InvalidInput
-from ._model import MAX_PARTS, MAX_POINTS, Many, Model, Number, as_float
-from .boundaries import COORDINATE_TOLERANCE, Point
-from .materials import NonNegative, Positive
-from .outline import Outline
+from .._errors import InvalidInput
+from .._model import MAX_PARTS, MAX_POINTS, Many, Model, Number, as_float
+from ..ground.outline import Outline
+from .edges import COORDINATE_TOLERANCE, Point
+from .soils import NonNegative, Positive
 
 _LAYERS: JsonDict = {"remedy": "layered soils have several times less across their layers, but not none"}
 _SERIES: JsonDict = {"remedy": "a number, or pairs of time and value as [[0, 4.0], [3600, 3.0]]"}

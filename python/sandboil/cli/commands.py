@@ -10,9 +10,7 @@ from typing import Annotated, TextIO
 
 import typer
 
-from . import _cli_lab, checkpoint
-from ._cli_out import motion_to_write
-from ._errors import (
+from .._errors import (
     InvalidInput,
     ResumeWarning,
     RunInterrupted,
@@ -20,14 +18,17 @@ from ._errors import (
     SandboilWarning,
     SuctionWarning,
 )
-from .motion import Kind, Motion
-from .plan import plan as plan_of
-from .results import FILE_NAME, load
-from .run import Accuracy
-from .run import run as run_scene
-from .scene import Scene
-from .simulation import doubts, loaded_motions
-from .site import CurveChoice, Place, deconvolution
+from ..core.simulation import doubts, loaded_motions
+from ..motion import Kind, Motion
+from ..results.reader import FILE_NAME, load
+from ..run import checkpoint
+from ..run.plan import plan as plan_of
+from ..run.run import Accuracy
+from ..run.run import run as run_scene
+from ..scene.scene import Scene
+from ..site import CurveChoice, Place, deconvolution
+from . import lab
+from .outputs import motion_to_write
 
 EXIT_INVALID = 2
 EXIT_STOPPED = 3
@@ -41,7 +42,7 @@ app = typer.Typer(
 )
 motion_app = typer.Typer(help="Look at ground motions and convert them.", no_args_is_help=True)
 app.add_typer(motion_app, name="motion")
-app.add_typer(_cli_lab.app, name="lab")
+app.add_typer(lab.app, name="lab")
 
 SceneFile = Annotated[Path, typer.Argument(help="Scene as a TOML file.", metavar="SCENE")]
 MotionOption = Annotated[
@@ -164,8 +165,8 @@ def plot(
 ) -> None:
     """Draw a run as PNG: seepage, the surface's motion, pore pressure, the column and stress paths."""
     # Drawing takes a second to load and no other command draws.
-    from .plots import Reference
-    from .plots import plot as draw
+    from ..results.plots import Reference
+    from ..results.plots import plot as draw
 
     laid_over = None if reference is None else Reference.read(reference)
     for path in draw(load(folder), out, reference=laid_over, stage=stage):

@@ -9,15 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import _core
-from ._errors import SandboilWarning
-from ._motion_spec import MotionSpec
-from .discretise import discretise
-from .hydraulics import Seepage
-from .motion import Motion
-from .motion._motion import SIGNIFICANT
-from .scene import Scene, Shaking
-from .simulation import LOOK_INTERVAL, VECTOR_FIELDS, Simulation, doubts, loaded_motions, written_fields
+from .. import _core
+from .._errors import SandboilWarning
+from ..core.simulation import LOOK_INTERVAL, VECTOR_FIELDS, Simulation, doubts, loaded_motions, written_fields
+from ..ground.discretise import discretise
+from ..motion import Motion
+from ..motion._motion import SIGNIFICANT
+from ..scene.motion_spec import MotionSpec
+from ..scene.scene import Scene, Shaking
+from ..scene.water import Seepage
 
 # Wall time for which each stage is tried, s: long enough for thousands of steps of a column.
 TRIAL_SECONDS = 1.5

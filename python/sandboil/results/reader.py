@@ -39,17 +39,9 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
-from . import _core
-from ._committed_file import CommittedFile, twin_of
-from ._errors import InvalidInput, ResumeWarning, SandboilError
-from ._hdf5 import LAYOUT, opened, refuse_foreign, said, text
-from .boundaries import COORDINATE_TOLERANCE
-from .discretise import Floats
-from .motion import Kind, Motion, ResponseSpectrum, response_spectrum
-from .motion._series import STANDARD_GRAVITY, butterworth
-from .plan import described_coefficient, pore_pressure_coefficients
-from .scene import Scene
-from .simulation import (
+from .. import _core
+from .._errors import InvalidInput, ResumeWarning, SandboilError
+from ..core.simulation import (
     ENERGY,
     FIELDS,
     HISTORIES,
@@ -63,6 +55,14 @@ from .simulation import (
     unknown_name,
     written_fields,
 )
+from ..files.committed_file import CommittedFile, twin_of
+from ..files.hdf5 import LAYOUT, opened, refuse_foreign, said, text
+from ..ground.discretise import Floats
+from ..motion import Kind, Motion, ResponseSpectrum, response_spectrum
+from ..motion._series import STANDARD_GRAVITY, butterworth
+from ..run.plan import described_coefficient, pore_pressure_coefficients
+from ..scene.edges import COORDINATE_TOLERANCE
+from ..scene.scene import Scene
 
 FILE_NAME = "results.h5"
 # Raised when a reader of the old layout would misunderstand the new one.

@@ -20,11 +20,13 @@ from pydantic import Field, StrictBool, model_validator
 from pydantic.config import JsonDict
 from shapely.geometry.base import BaseGeometry
 
-from . import _core, _scene_water, _toml
-from ._errors import InvalidInput
-from ._model import MAX_PARTS, MAX_POINTS, Many, Model, Number, field_remedy
-from ._motion_spec import GivenMotion, MotionSpec
-from .boundaries import (
+from .. import _core
+from .._errors import InvalidInput
+from .._model import MAX_PARTS, MAX_POINTS, Many, Model, Number, field_remedy
+from ..files import toml as _toml
+from ..ground.outline import Outline
+from .checks import water as _scene_water
+from .edges import (
     COORDINATE_TOLERANCE,
     AnySides,
     Arrival,
@@ -33,7 +35,9 @@ from .boundaries import (
     Point,
     Sides,
 )
-from .hydraulics import (
+from .motion_spec import GivenMotion, MotionSpec
+from .soils import Elastic, Material, PM4Sand, Positive
+from .water import (
     AnyCondition,
     AnyConductivity,
     Condition,
@@ -42,13 +46,11 @@ from .hydraulics import (
     VanGenuchten,
     line_of,
 )
-from .materials import Elastic, Material, PM4Sand, Positive
-from .outline import Outline
 
 if TYPE_CHECKING:
-    from .motion import Motion
-    from .plan import Plan
-    from .site._profile import CurveChoice, SiteProfile
+    from ..motion import Motion
+    from ..run.plan import Plan
+    from ..site._profile import CurveChoice, SiteProfile
 
 # Density of water where a scene without water gives Gs, Mg/m3: the scenes' usual 10 kN/m3 at 9.81 m/s2.
 REFERENCE_WATER_DENSITY = 10.0 / 9.81
@@ -1431,7 +1433,7 @@ class Scene(Model):
 
     def plan(self) -> Plan:
         """What would be computed and what it would cost."""
-        from .plan import plan
+        from ..run.plan import plan
 
         return plan(self)
 
@@ -1455,7 +1457,7 @@ class Scene(Model):
             "material", those of the soil model itself, which takes seconds per layer
         thickness : of a layer at most, m, but not less than a particle's spacing
         """
-        from .site._profile import profile
+        from ..site._profile import profile
 
         return profile(self, x, curves=curves, thickness=thickness)
 

@@ -21,16 +21,16 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon as Patch
 from matplotlib.ticker import MaxNLocator
 
-from ._errors import InvalidInput
-from ._input_file import read_text
-from ._style import DPI, INPUT, OURS, REFERENCE, STYLE
-from .discretise import Floats
-from .hydraulics import described
-from .motion import Motion
-from .motion._motion import SIGNIFICANT
-from .motion._series import butterworth
-from .results import PGA_CORNER, PGA_ORDER, Run, interval_of
-from .scene import Moving, RunOut
+from .._errors import InvalidInput
+from .._style import DPI, INPUT, OURS, REFERENCE, STYLE
+from ..files.input_file import read_text
+from ..ground.discretise import Floats
+from ..motion import Motion
+from ..motion._motion import SIGNIFICANT
+from ..motion._series import butterworth
+from ..scene.scene import Moving, RunOut
+from ..scene.water import described
+from .reader import PGA_CORNER, PGA_ORDER, Run, interval_of
 
 FOLDER = "plots"
 

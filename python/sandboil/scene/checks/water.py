@@ -13,9 +13,9 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from ._errors import InvalidInput
-from .boundaries import COORDINATE_TOLERANCE
-from .hydraulics import (
+from ..._errors import InvalidInput
+from ..edges import COORDINATE_TOLERANCE
+from ..water import (
     REFERENCES,
     AnyCondition,
     Drain,
@@ -31,7 +31,7 @@ from .hydraulics import (
 )
 
 if TYPE_CHECKING:
-    from .scene import Region, Scene, Shaking
+    from ..scene import Region, Scene, Shaking
 
 _WATER = "water = Water()"
 _PERMEABLE = "hydraulic_conductivity = 1e-5 (m/s) is a fine sand"

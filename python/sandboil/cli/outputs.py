@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer
 
-from ._errors import InvalidInput
+from .._errors import InvalidInput
 
 # Forms of a motion's file, and of a picture, known by their endings.
 MOTIONS = (".at2", ".csv")

@@ -19,13 +19,14 @@ from typing import Any, Literal, get_args
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from . import _neighbourhood, checkpoint
-from ._committed_file import twin_of
-from ._errors import InvalidInput, ResumeWarning, RunInterrupted, SandboilError, SimulationDiverged
+from .._errors import InvalidInput, ResumeWarning, RunInterrupted, SandboilError, SimulationDiverged
+from ..core.simulation import LOOK_INTERVAL, Simulation, unknown_name
+from ..files.committed_file import twin_of
+from ..results.reader import FILE_NAME, Run, Writer, holds, repair
+from ..scene.scene import Gravity, Scene
+from . import checkpoint
+from . import neighbourhood as _neighbourhood
 from .columns import save as save_column
-from .results import FILE_NAME, Run, Writer, holds, repair
-from .scene import Gravity, Scene
-from .simulation import LOOK_INTERVAL, Simulation, unknown_name
 
 Accuracy = Literal["draft", "standard", "reference"]
 

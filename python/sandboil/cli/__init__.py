@@ -1,0 +1,5 @@
+"""The command `sandboil`."""
+
+from .commands import app, main
+
+__all__ = ["app", "main"]

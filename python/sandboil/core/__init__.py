@@ -1,0 +1,1 @@
+"""The numerical core, driven and read in users' terms."""

@@ -1,0 +1,1 @@
+"""What a run leaves behind: the file, its reader, and pictures."""

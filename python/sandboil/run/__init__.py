@@ -1,0 +1,1 @@
+"""Running a scene into a folder, and planning it."""

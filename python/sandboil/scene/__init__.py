@@ -1,0 +1,1 @@
+"""The scene: what is there, and what is done to it."""

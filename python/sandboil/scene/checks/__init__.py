@@ -1,0 +1,1 @@
+"""What a scene must fulfil so that it can be computed."""
