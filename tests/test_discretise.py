@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from sandboil import Box, Elastic, Gravity, PM4Sand, Polygon, Region, Scene, Water, WaterTable, box, polygon
 from sandboil._errors import InvalidInput
 from sandboil.ground.discretise import discretise
-from sandboil.scene.scene import Box, Gravity, Polygon, Region, Scene, Water, WaterTable, box, polygon
-from sandboil.scene.soils import Elastic, PM4Sand
 
 GRAVITY = 9.81
 WATER = Water(unit_weight=10.0)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import sandboil as sb
 from sandboil import InvalidInput
-from sandboil.scene.water import value_at
 
 SAND = sb.Elastic(E=2.0e4, nu=0.3)
 
@@ -55,7 +54,7 @@ def test_conditions_go_on_unless_the_stage_has_its_own() -> None:
     )
     scene = slope([steady, sb.Gravity(), first, second, third])
     told = [
-        [(c.kind, value_at(c, 0.5), rest) for c, rest in scene.moving_conditions(stage)]
+        [(c.kind, c.value_at(0.5), rest) for c, rest in scene.moving_conditions(stage)]
         for stage in (first, second, third)
     ]
     assert told[0] == [("reservoir", 7.0, 7.0), ("head", 8.0, 8.0)]

@@ -33,7 +33,7 @@ from sandboil import (
     run,
 )
 from sandboil.run import neighbourhood
-from sandboil.run.run import with_accuracy
+from sandboil.run.accuracy import with_accuracy
 
 LEVEL_GROUND = Path(__file__).parents[1] / "examples" / "level_ground"
 

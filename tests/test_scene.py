@@ -11,10 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
-from sandboil._errors import InvalidInput
-from sandboil.motion import Motion
-from sandboil.scene.scene import (
-    REFERENCE_WATER_DENSITY,
+from sandboil import (
     CompliantBase,
     Gravity,
     MotionSpec,
@@ -29,6 +26,9 @@ from sandboil.scene.scene import (
     box,
     polygon,
 )
+from sandboil._errors import InvalidInput
+from sandboil.motion import Motion
+from sandboil.scene.phases import REFERENCE_WATER_DENSITY
 from sandboil.scene.soils import Elastic, PM4Sand
 
 LEVEL_GROUND = Path(__file__).parents[1] / "examples" / "level_ground"

@@ -22,37 +22,17 @@ from .motion import Motion, ResponseSpectrum, response_spectrum
 from .results.reader import History, Profile, Run, Summary, Surface, load
 from .run.plan import Plan
 from .run.run import run
+from .scene.conditions import Drain, Flux, Head, Pressure, Rain, Reservoir, SeepageFace
 from .scene.edges import BaseSegment, CompliantBase, Fixed, FreeField, Periodic, Roller, Sides
 from .scene.motion_spec import MotionSpec
-from .scene.scene import (
-    Box,
-    Gravity,
-    Numerics,
-    Output,
-    Polygon,
-    Rayleigh,
-    Region,
-    RunOut,
-    Scene,
-    Shaking,
-    Water,
-    WaterTable,
-    box,
-    polygon,
-)
+from .scene.numerics import Numerics
+from .scene.output import Output
+from .scene.region import Region
+from .scene.scene import Scene
+from .scene.shapes import Box, Polygon, box, polygon
 from .scene.soils import DruckerPrager, Elastic, MohrCoulomb, PM4Sand, PressureElastic, TotalStress
-from .scene.water import (
-    Conductivity,
-    Drain,
-    Flux,
-    Head,
-    Pressure,
-    Rain,
-    Reservoir,
-    Seepage,
-    SeepageFace,
-    VanGenuchten,
-)
+from .scene.stages import Gravity, Rayleigh, RunOut, Seepage, Shaking
+from .scene.water import Conductivity, VanGenuchten, Water, WaterTable
 from .site import HalfSpace, ModulusCurve, SiteLayer, SiteProfile
 
 __all__ = [

@@ -115,3 +115,14 @@ def nearest_name(name: str, candidates: Iterable[str]) -> str | None:
     by_lower = {candidate.lower(): candidate for candidate in candidates}
     found = difflib.get_close_matches(name[:_LONGEST_NAME].lower(), by_lower, n=1, cutoff=_NEAREST_CUTOFF)
     return by_lower[found[0]] if found else None
+
+
+def unknown_name(path: str, name: str, known: list[str]) -> InvalidInput:
+    """The refusal of a name that is none of `known`, with the nearest right one."""
+    meant = nearest_name(name, known)
+    return InvalidInput(
+        path,
+        name,
+        f"must be one of {', '.join(known)}",
+        f"did you mean {meant!r}?" if meant else "take one of these",
+    )

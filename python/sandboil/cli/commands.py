@@ -22,8 +22,8 @@ from ..core.simulation import doubts, loaded_motions
 from ..motion import Kind, Motion
 from ..results.reader import FILE_NAME, load
 from ..run import checkpoint
+from ..run.accuracy import Accuracy
 from ..run.plan import plan as plan_of
-from ..run.run import Accuracy
 from ..run.run import run as run_scene
 from ..scene.scene import Scene
 from ..site import CurveChoice, Place, deconvolution

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from .. import lab
 from .._errors import InvalidInput, SandboilError
 from .._style import DPI
+from .._types import Floats
 from ..files import toml as _toml
 from ..files.input_file import read_text
-from ..ground.discretise import Floats
 from ..lab._arguments import Integrator
 from ..scene.soils import Material, PM4Sand, material
 from .outputs import picture_to_write, to_write

@@ -8,22 +8,25 @@ import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import _core
-from .._errors import InvalidInput, SandboilError, SandboilWarning, SuctionWarning, nearest_name
+from .._errors import InvalidInput, SandboilError, SandboilWarning, SuctionWarning, unknown_name
+from .._types import Floats
 from ..files.fingerprint import fingerprint
-from ..ground.discretise import Discretisation, Floats, discretise
+from ..ground.discretise import Discretisation, discretise
 from ..motion import Motion
 from ..run.columns import HANDS, ColumnRecord
 from ..run.columns import INTERVAL as COLUMN_INTERVAL
 from ..run.columns import key as column_key
 from ..run.columns import load as load_columns
-from ..scene.edges import Periodic
-from ..scene.scene import AnyStage, Gravity, Moving, Region, RunOut, Scene, Shaking
-from ..scene.water import Drain, Seepage, series_of
+from ..scene.region import Region
+from ..scene.stages import AnyStage, Gravity, RunOut, Seepage, Shaking
+
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
 
 # How long the core computes before it looks whether the user wants to stop, s.
 LOOK_INTERVAL = 0.1
@@ -39,6 +42,9 @@ RESIDUAL_VELOCITY = 0.02
 # Names in :attr:`Simulation.fingerprints` beside those of the section's parts.
 STAGE_PREFIX = "stages."
 OUTPUT = "output"
+
+# The core's name of the flow scheme with the acceleration of the pore water.
+ACCELERATED_FLOW = "explicit with acceleration term"
 
 # More steps than any stage makes; the core counts in 64 bits.
 _NO_LIMIT = 2**62
@@ -135,17 +141,6 @@ ENERGY: dict[str, Quantity] = {
 }
 
 
-def unknown_name(path: str, name: str, known: list[str]) -> InvalidInput:
-    """The refusal of a name that is none of `known`, with the nearest right one."""
-    meant = nearest_name(name, known)
-    return InvalidInput(
-        path,
-        name,
-        f"must be one of {', '.join(known)}",
-        f"did you mean {meant!r}?" if meant else "take one of these",
-    )
-
-
 @dataclass(frozen=True)
 class Probe:
     """A point where histories are taken: its initial place (m) and how the scene speaks of it."""
@@ -227,7 +222,7 @@ class Simulation:
         self.threads = threads
         self._stages = [
             None
-            if duration is None or not isinstance(stage, Moving)
+            if duration is None or not isinstance(stage, Shaking | RunOut)
             else _moving_description(scene, stage, duration, waves, self.probes)
             for stage, duration, waves in zip(scene.stages, self._durations, self._waves, strict=True)
         ]
@@ -597,6 +592,11 @@ class Simulation:
         return "seepage" if self._grains is None else self._grains.flow_scheme
 
     @property
+    def accelerates_water(self) -> bool:
+        """Whether the pore water's acceleration enters the flow in the stage."""
+        return self.flow_scheme == ACCELERATED_FLOW
+
+    @property
     def stress_nodes(self) -> int:
         """Number of stress nodes."""
         return 0 if self._grains is None else int(np.prod(self._grains.stress().shape[:2]))
@@ -814,7 +814,7 @@ def _description(scene: Scene, particles: Discretisation) -> dict[str, Any]:
         "saturation": np.empty(0) if particles.saturation0 is None else particles.saturation0,
         "water": None if water is None else (water.unit_weight, water.bulk_modulus),
         "gravity": scene.gravity,
-        "period": x1 - x0 if isinstance(scene.sides, Periodic) else None,
+        "period": x1 - x0 if scene.is_periodic else None,
         **_edges(scene),
         "numerics": numerics,
     }
@@ -845,7 +845,7 @@ def _side(kind: str, x: float, extent: tuple[float, float]) -> dict[str, Any] | 
 
 def _moving_description(
     scene: Scene,
-    stage: Moving,
+    stage: Shaking | RunOut,
     duration: float,
     waves: tuple[list[Wave], list[int | None]] | None,
     probes: list[Probe],
@@ -918,7 +918,7 @@ def _shaking(
 def _condition(scene: Scene, condition: Any) -> dict[str, Any]:
     """A hydraulic condition as the numerical core takes it."""
     line = np.array(scene.condition_line(condition).coords)
-    series = () if isinstance(condition, Drain) else series_of(condition)
+    series = condition.series
     time, value = zip(*series, strict=True) if series else ((), ())
     return {"kind": condition.kind, "line": line, "series": (list(time), list(value))}
 

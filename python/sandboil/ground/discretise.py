@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -11,10 +12,10 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._errors import InvalidInput
-from ..scene.edges import COORDINATE_TOLERANCE, Periodic
-from ..scene.scene import Scene
+from .._types import COORDINATE_TOLERANCE, Floats
 
-Floats = NDArray[np.float64]
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class Overburden:
             bounds=scene.bounds,
             water_level=None if scene.water is None else scene.water_level_at,
             water_unit_weight=0.0 if scene.water is None else scene.water.unit_weight,
-            is_periodic=isinstance(scene.sides, Periodic),
+            is_periodic=scene.is_periodic,
         )
 
     def surface_elevation(self, x: Floats) -> Floats:

@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from .._errors import InvalidInput
-from ..scene.edges import COORDINATE_TOLERANCE
-
-Floats = NDArray[np.float64]
+from .._types import COORDINATE_TOLERANCE, Floats
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, Field, PlainValidator
 
-from .._model import Number
-from .._model import checked as _checked
-from ..ground.discretise import Floats
+from .._checked import checked as _checked
+from .._types import Floats, Number
 from . import _specimen
 from ._results import ShearTest
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from .._errors import InvalidInput, SandboilWarning, nearest_name
-from .._model import Number
-from ..scene.soils import PM4Sand
+from .._types import Number
+from ..scene.soils import PM4Sand, calibrated_sand
 from . import correlations
 from ._arguments import Bias, EarthPressure, Integrator, Limit, Pressure, VoidRatio, checked
 from ._resistance import (
@@ -137,6 +137,13 @@ def calibration(Dr: float, G0: float, crr: float, **options: Any) -> Calibration
 def calibrate_hpo(Dr: float, G0: float, crr: float, **options: Any) -> PM4Sand:
     """The calibrated sand of :func:`calibration`; same arguments, warnings and errors."""
     return calibration(Dr, G0, crr, **options).soil
+
+
+@calibrated_sand.by
+def _of_field_test(measured: dict[str, float], options: dict[str, Any]) -> PM4Sand:
+    """The sand of a field test: estimates by :mod:`correlations` for what the options leave open."""
+    given = {name: options[name] for name in ("sigma_v0", "crr") if name in options}
+    return calibrate_hpo(**(correlations.estimates(**measured, **given) | options))
 
 
 def _calibrate(

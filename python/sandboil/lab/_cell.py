@@ -14,9 +14,8 @@ from pydantic import Field, StrictBool
 
 from .. import _core
 from .._errors import InvalidInput, SandboilError
-from .._model import Number
+from .._types import Floats, Number
 from ..core.simulation import LOOK_INTERVAL, MAX_THREADS
-from ..ground.discretise import Floats
 from ..scene.soils import Material
 from ._arguments import (
     Count,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import StrictBool
 
 from .. import _core
-from ..ground.discretise import Floats
+from .._types import Floats
 from ._arguments import (
     AxialStrain,
     EarthPressure,

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from .._errors import InvalidInput
 from .._style import OURS, REFERENCE, STYLE
-from ..ground.discretise import Floats
+from .._types import Floats
 from ._results import (
     CompressionTest,
     CyclicTest,

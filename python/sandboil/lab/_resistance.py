@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field, PlainValidator
 
 from .._errors import InvalidInput
-from .._model import Number
-from ..ground.discretise import Floats
+from .._types import Floats, Number
 from ..scene.soils import PM4Sand
 from . import correlations
 from ._arguments import (

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .. import _core
 from .._errors import InvalidInput
-from ..ground.discretise import Floats
+from .._types import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

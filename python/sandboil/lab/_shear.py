@@ -11,7 +11,7 @@ from pydantic import StrictBool
 
 from .. import _core
 from .._errors import InvalidInput
-from ..ground.discretise import Floats
+from .._types import Floats
 from ..scene.soils import PM4Sand
 from ._arguments import (
     Bias,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from .._errors import InvalidInput
-from .._model import as_float
+from .._types import as_float
 
 P_ATM = 101.3
 """Atmospheric pressure, kPa."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast, get_args
@@ -13,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._errors import InvalidInput, nearest_name
+from .._provided import Provided
 from . import _files, _generators
 from ._series import (
     MAX_DT,
@@ -34,6 +34,10 @@ if TYPE_CHECKING:
 Kind = Literal["outcrop", "within", "upgoing"]
 # Fractions of the Arias intensity that bound the significant duration.
 SIGNIFICANT = (0.05, 0.95)
+
+
+# The motion at the base of the ground below a record, with options, by `sandboil.site`.
+deconvolved: Provided[[Motion, SiteProfile, dict[str, Any]], Motion] = Provided()
 
 
 class Motion:
@@ -462,13 +466,7 @@ class Motion:
         ------
         InvalidInput : see :func:`sandboil.site.deconvolution`
         """
-        # Imported here because the analysis itself imports this module.
-        from ..site import DeconvolutionWarning, deconvolution
-
-        found = deconvolution(self, profile, **options)
-        for reason in found.doubts:
-            warnings.warn(reason, DeconvolutionWarning, stacklevel=2)
-        return found.motion
+        return deconvolved(self, profile, options)
 
     # Files
 

@@ -23,13 +23,12 @@ from matplotlib.ticker import MaxNLocator
 
 from .._errors import InvalidInput
 from .._style import DPI, INPUT, OURS, REFERENCE, STYLE
+from .._types import Floats
 from ..files.input_file import read_text
-from ..ground.discretise import Floats
 from ..motion import Motion
 from ..motion._motion import SIGNIFICANT
 from ..motion._series import butterworth
-from ..scene.scene import Moving, RunOut
-from ..scene.water import described
+from ..scene.stages import RunOut
 from .reader import PGA_CORNER, PGA_ORDER, Run, interval_of
 
 FOLDER = "plots"
@@ -148,7 +147,7 @@ def _shaken_stages(run: Run) -> list[str]:
     return [
         name
         for name, kind in zip(run.scene.stage_names, run.scene.stages, strict=True)
-        if isinstance(kind, Moving) and name in run.stages
+        if kind.moves and name in run.stages
     ]
 
 
@@ -232,7 +231,7 @@ def seepage(run: Run) -> Figure:
     for i, (condition, (_, inflow)) in enumerate(zip(stage.conditions, run.discharge, strict=True)):
         line = np.asarray(shapely.get_coordinates(run.scene.condition_line(condition)))
         colour = _CONDITIONS[i % len(_CONDITIONS)]
-        label = f"{described(condition, time)}: {inflow:+.3g} m$^3$/s per m"
+        label = f"{condition.described(time)}: {inflow:+.3g} m$^3$/s per m"
         axes.plot(*line.T, color=colour, lw=3.0, solid_capstyle="butt", label=label)
     axes.set(xlabel="x, m", ylabel="y, m", aspect="equal")
     axes.grid(visible=False)

@@ -40,7 +40,8 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _core
-from .._errors import InvalidInput, ResumeWarning, SandboilError
+from .._errors import InvalidInput, ResumeWarning, SandboilError, unknown_name
+from .._types import COORDINATE_TOLERANCE, Floats
 from ..core.simulation import (
     ENERGY,
     FIELDS,
@@ -52,16 +53,13 @@ from ..core.simulation import (
     Probe,
     Simulation,
     pore_pressure_ratio,
-    unknown_name,
     written_fields,
 )
 from ..files.committed_file import CommittedFile, twin_of
 from ..files.hdf5 import LAYOUT, opened, refuse_foreign, said, text
-from ..ground.discretise import Floats
 from ..motion import Kind, Motion, ResponseSpectrum, response_spectrum
 from ..motion._series import STANDARD_GRAVITY, butterworth
 from ..run.plan import described_coefficient, pore_pressure_coefficients
-from ..scene.edges import COORDINATE_TOLERANCE
 from ..scene.scene import Scene
 
 FILE_NAME = "results.h5"

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from .._errors import SimulationDiverged
+from .._types import Floats
 from ..core.simulation import FIELDS, VECTOR_FIELDS, Simulation
-from ..ground.discretise import Floats
 
 FILE_NAME = "neighbourhood.csv"
 PICTURE_NAME = "neighbourhood.png"

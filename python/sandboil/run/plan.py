@@ -6,6 +6,7 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,8 +17,12 @@ from ..ground.discretise import discretise
 from ..motion import Motion
 from ..motion._motion import SIGNIFICANT
 from ..scene.motion_spec import MotionSpec
-from ..scene.scene import Scene, Shaking
-from ..scene.water import Seepage
+from ..scene.physics import WATER_ACCELERATION, Physics
+from ..scene.stages import AnyStage
+from .accuracy import with_accuracy
+
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
 
 # Wall time for which each stage is tried, s: long enough for thousands of steps of a column.
 TRIAL_SECONDS = 1.5
@@ -66,7 +71,7 @@ class Plan:
     spacing : (dx, dy), m
     threads : that the trial ran on
     accuracy : preset that filled what the scene leaves open
-    physics : (name, active, reason) of all that can be switched off
+    physics : (name, on, why) of all that a scene can leave out
     stages : cost of each
     arrays : bytes of the core's arrays by name, in the last stage
     file_size : fields and histories in the results before compression, bytes
@@ -80,7 +85,7 @@ class Plan:
     spacing: tuple[float, float]
     threads: int
     accuracy: str
-    physics: list[tuple[str, bool, str]]
+    physics: list[Physics]
     stages: list[StagePlan]
     arrays: dict[str, int]
     file_size: int
@@ -191,8 +196,6 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
 
     Raises :class:`InvalidInput` for what a run would refuse.
     """
-    from .run import with_accuracy
-
     scene = with_accuracy(scene, accuracy)
     told = doubts(scene, loaded_motions(scene))
     with warnings.catch_warnings():
@@ -213,8 +216,8 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
         duration = scene.duration(stage)
         step_time = spent / max(made, 1)
         # Steps of a seepage stage grow as it goes.
-        untold = duration is None or isinstance(stage, Seepage)
-        steps = made if done else None if untold or duration is None else round(duration / dt)
+        foreseen = round(duration / dt) if stage.moves and duration is not None else None
+        steps = made if done else foreseen
         stages.append(
             StagePlan(
                 name=scene.stage_names[index],
@@ -244,28 +247,22 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
     )
 
 
-def _physics(scene: Scene, simulation: Simulation) -> list[tuple[str, bool, str]]:
-    """The scene's active physics; what was left to the solver as the last stage has chosen it."""
-    scheme = simulation.flow_scheme
-    chosen = scene.uses_acceleration_term and "acceleration" not in scheme
+def _physics(scene: Scene, simulation: Simulation) -> list[Physics]:
+    """The scene's physics; what it leaves to the solver, as the last stage has chosen."""
     return [
-        (name, False, f"pore pressure diffusion is {scheme}")
-        if chosen and name == "water acceleration"
-        else (name, on, reason)
-        for name, on, reason in scene.active_physics()
+        fact._replace(on=False, why=f"pore pressure diffusion is {simulation.flow_scheme}")
+        if fact.name == WATER_ACCELERATION and fact.on and not simulation.accelerates_water
+        else fact
+        for fact in scene.active_physics()
     ]
 
 
 def _from_strong_part(scene: Scene) -> Scene:
     """The scene with its motions cut to begin where strong shaking does: a quiet start would tell nothing."""
-    stages = [
-        stage.with_motions(_cut_at(_strong_time(stage))) if isinstance(stage, Shaking) else stage
-        for stage in scene.stages
-    ]
-    return scene.model_copy(update={"stages": tuple(stages)})
+    return scene.changed(stages=[stage.with_motions(_cut_at(_strong_time(stage))) for stage in scene.stages])
 
 
-def _strong_time(stage: Shaking) -> float:
+def _strong_time(stage: AnyStage) -> float:
     """When strong shaking begins in the first motion of a stage, s; 0 without one."""
     spec = next((spec for _, spec in stage.motions if spec is not None), None)
     if spec is None:

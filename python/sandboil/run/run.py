@@ -14,49 +14,26 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from .._errors import InvalidInput, ResumeWarning, RunInterrupted, SandboilError, SimulationDiverged
-from ..core.simulation import LOOK_INTERVAL, Simulation, unknown_name
+from ..core.simulation import LOOK_INTERVAL, Simulation
 from ..files.committed_file import twin_of
 from ..results.reader import FILE_NAME, Run, Writer, holds, repair
-from ..scene.scene import Gravity, Scene
+from ..scene.stages import Gravity
 from . import checkpoint
 from . import neighbourhood as _neighbourhood
+from .accuracy import Accuracy, with_accuracy
 from .columns import save as save_column
 
-Accuracy = Literal["draft", "standard", "reference"]
-
-# What each preset gives to numerics that the scene leaves open. Measured on the level ground
-# (docs/validation.md, rows "draft" and "explicit"): the draft makes fewer steps with a coarser soil update;
-# the reference solves the pore water explicitly, with its acceleration where it can, in more of them.
-ACCURACY: dict[str, dict[str, Any]] = {
-    "draft": {"integrator_tolerance": 1.0e-4, "time_step_factor": 0.9},
-    "standard": {},
-    "reference": {"integrator_tolerance": 1.0e-6, "diffusion": "explicit"},
-}
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
 
 # The time left is told from the speed of the last so many seconds: the soil's cost changes as it liquefies.
 _SPEED_WINDOW = 30.0
-
-
-def with_accuracy(scene: Scene, accuracy: str) -> Scene:
-    """The scene with a preset's numerics wherever it says nothing itself.
-
-    Raises :class:`InvalidInput` for an unknown preset.
-    """
-    if accuracy not in ACCURACY:
-        raise unknown_name("accuracy", accuracy, list(get_args(Accuracy)))
-    said = scene.numerics.model_fields_set
-    filled = {name: value for name, value in ACCURACY[accuracy].items() if name not in said}
-    if scene.numerics.integrator != "default":
-        filled.pop("integrator_tolerance", None)
-    return (
-        scene.model_copy(update={"numerics": scene.numerics.model_copy(update=filled)}) if filled else scene
-    )
 
 
 def run(

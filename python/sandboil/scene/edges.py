@@ -10,21 +10,15 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from .._errors import InvalidInput
-from .._model import MAX_PARTS, Many, Model, Number
+from .._model import Model
+from .._types import COORDINATE_TOLERANCE, MAX_PARTS, Many, NonNegative, Number, Point, Positive
 from .motion_spec import GivenMotion, MotionSpec
-from .soils import NonNegative, Positive
 
 if TYPE_CHECKING:
     from ..motion import Motion
 
-# Coordinates closer than this are the same point, m: far below any spacing, far above round-off of a
-# kilometre-wide section.
-COORDINATE_TOLERANCE = 1.0e-6
-
 # Vp/Vs of an elastic solid of Poisson's ratio zero, the least that soil and rock have.
 LEAST_SPEED_RATIO = sqrt(2.0)
-
-Point = tuple[Number, Number]
 
 
 class Periodic(Model):

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import inspect
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from .._errors import InvalidInput, nearest_name
-from .._model import Many, Model, Number
-from .soils import Positive
-
-if TYPE_CHECKING:
-    from ..motion import Motion
+from .._model import Model
+from .._types import Many, Number, Positive
+from ..motion import Motion
 
 
 class MotionSpec(Model):
@@ -47,8 +45,6 @@ class MotionSpec(Model):
         """Check the generator's arguments and write its defaults out: the scene then keeps its meaning."""
         if said is None:
             return None
-        from ..motion import Motion
-
         generator = str(field.field_name)
         known = dict(inspect.signature(getattr(Motion, generator)).parameters)
         known.pop("kind", None)
@@ -105,8 +101,6 @@ class MotionSpec(Model):
 
     def load(self) -> Motion:
         """The motion itself; :class:`InvalidInput` if its file or its numbers are no motion."""
-        from ..motion import Motion
-
         if self.file is not None:
             motion = Motion.from_file(self.file, unit=self.unit, column=self.column, kind=self.kind)
         elif self.synthetic is not None:
@@ -118,18 +112,10 @@ class MotionSpec(Model):
             motion = Motion(**samples)
         return motion if self.scale is None else motion.scaled(factor=self.scale)
 
-    def anchored(self, folder: Path) -> MotionSpec:
-        """The same with its file found from `folder`."""
-        if self.file is None:
-            return self
-        return self.model_copy(update={"file": str(folder.absolute() / self.file)})
-
 
 def _said(value: object) -> object:
     if value is None or isinstance(value, (dict, MotionSpec)):
         return value
-    from ..motion import Motion
-
     return MotionSpec.of(value) if isinstance(value, Motion) else value
 
 

@@ -9,7 +9,10 @@ from pydantic.config import JsonDict
 
 from .. import _core
 from .._errors import InvalidInput
-from .._model import Model, Number, field_remedy
+from .._model import Model
+from .._provided import Provided
+from .._refusals import field_remedy
+from .._types import NonNegative, Number, Positive
 
 _FRACTION: JsonDict = {"remedy": "it is a fraction, not a percentage: 55 % is written 0.55"}
 _NU: JsonDict = {
@@ -34,8 +37,9 @@ _VOID_RATIO_MAX = 10.0
 # Largest critical-state friction angle of any sand, degrees; above it the entry is a slip of units.
 _PHI_CV_MAX = 50.0
 
-Positive = Annotated[Number, Field(gt=0.0)]
-NonNegative = Annotated[Number, Field(ge=0.0)]
+
+# The sand of a field test with options, by `sandboil.lab`, which tests soils.
+calibrated_sand: Provided[[dict[str, float], dict[str, Any]], PM4Sand] = Provided()
 
 
 class PM4Sand(Model):
@@ -149,26 +153,18 @@ class PM4Sand(Model):
         `sigma_v0` (kPa, default one atmosphere); `hpo` by :func:`sandboil.lab.calibrate_hpo`, which takes all
         further `options`. Raises :class:`InvalidInput`.
         """
-        return cls._calibrated({"N160cs": N160cs}, options)
+        return calibrated_sand({"N160cs": N160cs}, options)
 
     @classmethod
     def from_cpt(cls, qc1Ncs: float, **options: Any) -> PM4Sand:
         """Sand of a clean-sand normalised cone resistance q_c1Ncs (Boulanger and Idriss 2014); else as
         :meth:`from_spt`."""
-        return cls._calibrated({"qc1Ncs": qc1Ncs}, options)
+        return calibrated_sand({"qc1Ncs": qc1Ncs}, options)
 
     @classmethod
     def from_density(cls, Dr: float, **options: Any) -> PM4Sand:
         """Sand of a relative density; else as :meth:`from_spt` of (N1)60cs = 46 Dr^2."""
-        return cls._calibrated({"Dr": Dr}, options)
-
-    @classmethod
-    def _calibrated(cls, measured: dict[str, float], options: dict[str, Any]) -> PM4Sand:
-        # The laboratory tests materials, so it cannot be there before them.
-        from ..lab import calibrate_hpo, correlations
-
-        said = {name: options[name] for name in ("sigma_v0", "crr") if name in options}
-        return calibrate_hpo(**(correlations.estimates(**measured, **said) | options))
+        return calibrated_sand({"Dr": Dr}, options)
 
     @model_validator(mode="after")
     def _void_ratios_ordered(self) -> PM4Sand:

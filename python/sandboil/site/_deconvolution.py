@@ -6,20 +6,22 @@ Vertical shear waves in layers of complex stiffness, after Schnabel, Lysmer and 
 from __future__ import annotations
 
 import itertools
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, PlainValidator, StrictBool
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
+from .._checked import checked
 from .._errors import InvalidInput, SandboilWarning
-from .._model import Number, checked
+from .._types import Number, Positive
 from ..motion import Motion
+from ..motion._motion import deconvolved
 from ..motion._series import Array
-from ..scene.soils import Positive
 from ._profile import SiteProfile
 
 Complex = npt.NDArray[np.complex128]
@@ -126,6 +128,16 @@ def _as_motion(value: object) -> Motion:
     if not isinstance(value, Motion):
         raise ValueError("must be a Motion")
     return value
+
+
+@deconvolved.by
+def _with_warnings(motion: Motion, profile: SiteProfile, options: dict[str, Any]) -> Motion:
+    """The motion of :func:`deconvolution`, with a warning for each of its doubts."""
+    found = deconvolution(motion, profile, **options)
+    for doubt in found.doubts:
+        # At the line that called the method of the motion.
+        warnings.warn(doubt, DeconvolutionWarning, stacklevel=4)
+    return found.motion
 
 
 @checked("site")

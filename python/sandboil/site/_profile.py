@@ -11,14 +11,21 @@ from pydantic import Field, model_validator
 from pydantic.config import JsonDict
 
 from .. import _core, lab
+from .._checked import checked
 from .._errors import InvalidInput
-from .._model import Many, Model, Number, checked
-from ..ground.discretise import Floats, discretise
-from ..scene.edges import COORDINATE_TOLERANCE, CompliantBase
-from ..scene.scene import DEFAULT_LAYER, Scene, Shaking
-from ..scene.soils import Elastic, Material, NonNegative, Positive, PressureElastic
+from .._model import Model
+from .._types import COORDINATE_TOLERANCE, Floats, Many, NonNegative, Number, Positive
+from ..ground.discretise import discretise
+from ..scene.edges import CompliantBase
+from ..scene.soils import Elastic, Material, PressureElastic
 
-# Largest number of layers: the waves of a long record in them need about 2 GB of memory.
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
+
+# Thickness of the layers that a profile is divided into, m: a fifth of the wavelength at 20 Hz in soil of
+# 100 m/s.
+DEFAULT_LAYER = 1.0
+# Most layers of a profile: the waves of a long record in them fill about 2 GB.
 MAX_LAYERS = 1000
 # Upper limit of damping ratios: at 0.5, a wave decreases to a thirtieth within one wavelength.
 DAMPING_LIMIT = 0.5
@@ -224,15 +231,8 @@ class SiteProfile(Model):
         return sum(layer.thickness / layer.Vs for layer in self.layers)
 
 
-@checked("scene")
-def profile(
-    scene: Scene,
-    x: Number | None = None,
-    *,
-    curves: CurveChoice = "darendeli",
-    thickness: Positive = DEFAULT_LAYER,
-) -> SiteProfile:
-    """The profile of the column of particles nearest to `x`; see :meth:`Scene.profile`."""
+def profile(scene: Scene, x: float | None, *, curves: CurveChoice, thickness: float) -> SiteProfile:
+    """The column of a scene's particles nearest to `x` as a profile; see :meth:`Scene.profile`."""
     x0, _, x1, _ = scene.bounds
     place = 0.5 * (x0 + x1) if x is None else x
     if not x0 <= place <= x1:
@@ -261,7 +261,7 @@ def profile(
             curve = _curve(scene, region, sigma_v, curves)
             layers.append(SiteLayer(len(part) * dy, unit_weight, Vs, curve=curve))
 
-    base = next((stage.base for stage in scene.stages if isinstance(stage, Shaking)), CompliantBase())
+    base = scene.shakings[0][1].base if scene.shakings else CompliantBase()
     if base.Vs is not None and base.density is not None:
         half_space = HalfSpace(base.density * scene.gravity, base.Vs)
     else:

@@ -1,0 +1,188 @@
+"""Which physics a scene computes, which it leaves out, and why."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .. import _core
+from .edges import CompliantBase
+from .section import side_profile
+from .soils import Elastic
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+_DRY, _STILL = "the scene has no water", "no shaking stage"
+
+# Names of the facts that a plan can know better from a trial.
+WATER_ACCELERATION = "water acceleration"
+
+
+class Physics(NamedTuple):
+    """A part of the physics, whether a scene computes it, and why or why not."""
+
+    name: str
+    on: bool
+    why: str
+
+
+def _physics(name: str, why: str, *missing: tuple[bool, str]) -> Physics:
+    """Physics that is on for a reason, or off for the first of the reasons that apply."""
+    lacking = [reason for applies, reason in missing if applies]
+    return Physics(name, not lacking, lacking[0] if lacking else why)
+
+
+def active_physics(scene: Scene) -> list[Physics]:
+    """Everything that a scene can leave out."""
+    return [*_of_water(scene), *_of_soil(scene), *_of_edges(scene), *_of_numerics(scene)]
+
+
+def _of_water(scene: Scene) -> list[Physics]:
+    dry, moves = (scene.water is None, _DRY), any(stage.moves for stage in scene.stages)
+    permeable = [region.name for region in scene.regions if region.hydraulic_conductivity]
+    no_flow = (dry, (not moves, _STILL), (not permeable, "no region is permeable"))
+    seepage = scene.seepage
+    steady = seepage is not None and seepage.duration is None
+    term = scene.numerics.acceleration_term
+    compared = "no region exceeds" if scene.uses_acceleration_term else "a region exceeds"
+    chosen = f"{compared} {_core.ACCELERATION_TERM_CONDUCTIVITY:g} m/s"
+    if term != "auto":
+        chosen = f"numerics.acceleration_term is {term!r}"
+    return [
+        _physics("pore water", _water_level(scene), dry),
+        _physics(
+            "seepage",
+            "to its steady state" if steady else "for its duration",
+            dry,
+            (seepage is None, "no seepage stage"),
+        ),
+        _physics("water diffusion", f"conductivity in {', '.join(permeable)}", *no_flow),
+        _physics(WATER_ACCELERATION, chosen, *no_flow, (not scene.uses_acceleration_term, chosen)),
+        _physics(
+            "partial saturation",
+            ", ".join(region.name for region in scene.regions if region.retention) or "dry above the water",
+            dry,
+            *_always_full(scene),
+        ),
+    ]
+
+
+def _water_level(scene: Scene) -> str:
+    x0, _, x1, _ = scene.bounds
+    low, high = sorted(scene.water_level_at(np.array([x0, x1])))
+    level = f"{low:g} m" if low == high else f"{low:g} to {high:g} m"
+    return f"water table at elevation {level}"
+
+
+def _always_full(scene: Scene) -> list[tuple[bool, str]]:
+    """Why no pore is partly saturated, or why that has no effect."""
+    curves = scene.holds_suction and any(region.retention for region in scene.regions)
+    changed = curves and any(stage.conditions for _, stage in scene.shakings)
+    run_out_alone = scene.run_out is not None and scene.seepage is None and not scene.shakings
+    return [
+        (not scene.is_partly_saturated and not changed, "the water table is nowhere below the ground"),
+        (run_out_alone, "soil keeps its water in a run-out"),
+    ]
+
+
+def _of_soil(scene: Scene) -> list[Physics]:
+    # Linear elasticity has no state besides the stress.
+    stateful = [region.name for region in scene.regions if not isinstance(region.material, Elastic)]
+    moves = any(stage.moves for stage in scene.stages)
+    return [
+        _physics(
+            "soil state",
+            f"in {', '.join(stateful)}",
+            (not stateful, "every region is linearly elastic"),
+            (not moves, _STILL),
+        )
+    ]
+
+
+def _of_edges(scene: Scene) -> list[Physics]:
+    shakings = [stage for _, stage in scene.shakings]
+    still = (not shakings, _STILL)
+    absorbing = [stage for stage in shakings if stage.base_vertical == "absorbing"]
+    passing = [passage for stage in shakings if (passage := _passage(stage.base))]
+    return [
+        _physics("base dashpots", "compliant base while shaking", still),
+        _physics(
+            "vertical waves",
+            "under a vertical motion" if any(s.vertical for s in absorbing) else "the base absorbs them",
+            still,
+            (not absorbing, "the base is a roller vertically"),
+        ),
+        _physics(
+            "wave passage",
+            "; ".join(passing),
+            still,
+            (not passing, "the wave reaches all of the base at once"),
+        ),
+        _physics(
+            "free-field columns",
+            _columns(scene),
+            (scene.is_periodic, "the sides are periodic"),
+            ("free-field" not in scene.side_kinds, f"the sides are {' and '.join(scene.side_kinds)}"),
+            still,
+        ),
+    ]
+
+
+def _passage(base: CompliantBase) -> str:
+    """How a wave reaches different places of a base at different times; empty where it does not."""
+    if base.apparent_velocity is not None:
+        return f"at an apparent {base.apparent_velocity:g} m/s"
+    return f"{len(base.segments)} segments" if len(base.segments) > 1 else ""
+
+
+def _columns(scene: Scene) -> str:
+    """Which sides have a column, and how many particles all columns together."""
+    x0, _, x1, _ = scene.bounds
+    edges = ((x0, "left", scene.outline.left), (x1, "right", scene.outline.right))
+    free = [
+        (side_profile(scene, x), round((top - bottom) / scene.spacing), hand)
+        for (x, hand, (bottom, top)), kind in zip(edges, scene.side_kinds, strict=True)
+        if kind == "free-field"
+    ]
+    hands = " and ".join(hand for _, _, hand in free)
+    passing = any(_passage(stage.base) for _, stage in scene.shakings)
+    alike = len(free) == 2 and free[0][0] == free[1][0] and not passing
+    distinct = free[:1] if alike else free
+    particles = sum(rows for _, rows, _ in distinct)
+    number = f"{len(distinct)} column{'s' if len(distinct) > 1 else ''}"
+    return f"on the {hands}: {number} of {particles} particles{' in all' if len(distinct) > 1 else ''}"
+
+
+def _of_numerics(scene: Scene) -> list[Physics]:
+    numerics, run_out = scene.numerics, scene.run_out
+    moves, still = any(stage.moves for stage in scene.stages), (not scene.shakings, _STILL)
+    damped = [str(stage.rayleigh) for _, stage in scene.shakings if stage.rayleigh]
+    return [
+        _physics(
+            "local damping",
+            f"numerics.local_damping is {numerics.local_damping:g}",
+            (not moves, _STILL),
+            (numerics.local_damping == 0.0, "numerics.local_damping is 0"),
+        ),
+        _physics("Rayleigh damping", "; ".join(damped), still, (not damped, "no shaking stage asks for it")),
+        _physics(
+            "dispersion correction",
+            "numerics.dispersion_correction is true",
+            still,
+            (not numerics.dispersion_correction, "numerics.dispersion_correction is false"),
+        ),
+        _physics(
+            "run-out",
+            f"large displacements, viscosity {run_out.viscosity:g}" if run_out else "",
+            (run_out is None, "no run-out stage"),
+        ),
+        Physics(
+            "velocity filter",
+            numerics.filter_strength > 0.0,
+            "the printed operators have none"
+            if numerics.operators == "printed"
+            else f"numerics.velocity_filter is {numerics.filter_strength:g}",
+        ),
+    ]
