@@ -65,7 +65,7 @@ def test_what_was_kept_is_what_is_read(kept: sb.Run, tmp_path: Path) -> None:
 
 def test_every_stage_reads_its_own_columns(tmp_path: Path) -> None:
     scene = ground()
-    twice = scene.model_copy(update={"stages": (*scene.stages, sb.Shaking(MOTION.flipped(), duration=1.0))})
+    twice = scene.changed(stages=[*scene.stages, sb.Shaking(MOTION.flipped(), duration=1.0)])
     first = sb.run(twice, tmp_path / "first", threads=1, keep_columns=True)
     again = sb.run(twice, tmp_path / "again", threads=1, columns=tmp_path / "first")
     for stage in ("shaking", "shaking_2"):

@@ -248,7 +248,7 @@ def test_stopping_and_stepping_change_nothing(scene: Scene) -> None:
 
 @pytest.mark.parametrize("interval", [0.25, 1.0e4])
 def test_frames_are_written_on_the_way_and_change_nothing(interval: float, tmp_path: Path) -> None:
-    scene = drawdown().model_copy(update={"output": Output(field_dt=interval)})
+    scene = drawdown().changed(output=Output(field_dt=interval))
     results = run(scene, tmp_path, threads=1)
     assert results.times[0] == 0.0
     assert results.times[-1] == 4.0e4

@@ -162,13 +162,13 @@ def test_sudden_changes_end_in_numbers(conductivity: float, retention: object, c
     """A drawdown, a storm on dry clay, a flood over dry sand and a base that drains, all at once."""
     dry = retention is not None
     scene = slope([sb.Gravity(), sb.Shaking(duration=0.2, conditions=[condition])])
-    ground = scene.regions[0].model_copy(
-        update={"hydraulic_conductivity": conductivity, "retention": retention}
-    )
-    changes: dict[str, object] = {"regions": (ground,)}
+    changes: dict[str, object] = {
+        "regions[0].hydraulic_conductivity": conductivity,
+        "regions[0].retention": retention,
+    }
     if dry:
         changes["water_table"] = sb.WaterTable(elevation=1.0, above="retention")
-    simulation = sb.Simulation(scene.model_copy(update=changes), threads=1)
+    simulation = sb.Simulation(scene.changed(**changes), threads=1)
     simulation.run_stage()
     simulation.run_stage()
     pressure, moved = simulation.field("pore_pressure"), simulation.field("displacement")

@@ -352,8 +352,7 @@ def test_handlers_of_signals_are_put_back(tmp_path: Path) -> None:
 
 
 def shortened(scene: Scene) -> Scene:
-    gravity, shaking = scene.stages
-    return scene.model_copy(update={"stages": (gravity, shaking.model_copy(update={"duration": 0.3}))})
+    return scene.changed(**{"stages[1].duration": 0.3})
 
 
 @pytest.mark.parametrize("language", ["toml", "py"])

@@ -375,7 +375,7 @@ def test_only_what_the_scene_requires_is_active() -> None:
     }
     dry = dry_column(dry_unit_weight=18.0)
     assert active(dry) == always | {"base dashpots"}
-    assert active(dry.model_copy(update={"stages": (Gravity(),)})) == always
+    assert active(dry.changed(stages=[Gravity()])) == always
     at_rest = column(stages=[Gravity()])
     assert active(at_rest) == always | {"pore water"}
     assert ("water diffusion", False, "no shaking stage") in at_rest.active_physics()

@@ -184,8 +184,8 @@ def test_coarse_sand_finds_its_steady_state() -> None:
     """Its capillary rise, 0.07 m, is far below a spacing: conductivities swing unless followed with care."""
     embankment = sb.Scene.from_toml(Path(__file__).parents[1] / "examples" / "embankment" / "scene.toml")
     sand = sb.VanGenuchten(14.5, 2.68, residual_saturation=0.05)
-    regions = tuple(region.model_copy(update={"retention": sand}) for region in embankment.regions)
-    scene = embankment.model_copy(update={"regions": regions, "stages": embankment.stages[:1]})
+    regions = [region.changed(retention=sand) for region in embankment.regions]
+    scene = embankment.changed(regions=regions, stages=embankment.stages[:1])
     simulation = sb.Simulation(scene)
     simulation.run_stage()
     assert simulation.steps < 400

@@ -215,7 +215,7 @@ def draw_dam(geometry: dict[str, Any]) -> None:
     year = 365.0 * 86_400.0
     rising = sb.Reservoir("surface", level=[(0.0, 308.0), (year, 338.0)], x=(-220.0, 0.0))
     rise = dam(geometry, 2.5, [rising, tail, drain], 3.0 * year)
-    rise = rise.model_copy(update={"water_table": sb.WaterTable(points=[(-100.0, 308.0), (100.0, 305.0)])})
+    rise = rise.changed(water_table=sb.WaterTable(points=[(-100.0, 308.0), (100.0, 305.0)]))
     simulation = sb.Simulation(rise)
     for k, months in enumerate((6, 12, 18, 24, 36)):
         while not simulation.advance(months / 12.0 * year, 60.0):

@@ -20,6 +20,8 @@ from .._errors import (
 )
 from ..core.simulation import doubts, loaded_motions
 from ..motion import Kind, Motion
+from ..results.plots import Reference
+from ..results.plots import plot as draw
 from ..results.reader import FILE_NAME, load
 from ..run import checkpoint
 from ..run.accuracy import Accuracy
@@ -164,10 +166,6 @@ def plot(
     stage: Annotated[str | None, typer.Option(help="A shaking stage, default the last.")] = None,
 ) -> None:
     """Draw a run as PNG: seepage, the surface's motion, pore pressure, the column and stress paths."""
-    # Drawing takes a second to load and no other command draws.
-    from ..results.plots import Reference
-    from ..results.plots import plot as draw
-
     laid_over = None if reference is None else Reference.read(reference)
     for path in draw(load(folder), out, reference=laid_over, stage=stage):
         typer.echo(str(path))

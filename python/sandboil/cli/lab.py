@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import Progress
 
 from .. import lab
 from .._errors import InvalidInput, SandboilError
@@ -131,8 +133,6 @@ def cell(
 ) -> None:
     """Cyclic simple shear of a block of particles with a free centre, in minutes; prints as dss does."""
     # It loads slowly, and no other test of the laboratory is long enough for it.
-    from rich.console import Console
-    from rich.progress import Progress
 
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:

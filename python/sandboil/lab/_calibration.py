@@ -13,7 +13,7 @@ from pydantic import Field
 from .._errors import InvalidInput, SandboilWarning, nearest_name
 from .._types import Number
 from ..scene.soils import PM4Sand, calibrated_sand
-from . import correlations
+from . import _resistance_plots, correlations
 from ._arguments import Bias, EarthPressure, Integrator, Limit, Pressure, VoidRatio, checked
 from ._resistance import (
     Conditions,
@@ -83,9 +83,7 @@ class Calibration:
 
     def plot(self) -> Figure:
         """Plot :meth:`curve` and the target; a matplotlib figure."""
-        from ._resistance_plots import resistance
-
-        return resistance(self.curve(), target=(self.cycles, self.target))
+        return _resistance_plots.resistance(self.curve(), target=(self.cycles, self.target))
 
 
 def _first_guess(density: float, resistance: float) -> float:

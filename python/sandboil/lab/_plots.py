@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from .._errors import InvalidInput
-from .._style import OURS, REFERENCE, STYLE
+from .._style import OURS, REFERENCE, new_figure, styled
 from .._types import Floats
-from ._results import (
-    CompressionTest,
-    CyclicTest,
-    ModulusReduction,
-    PathTest,
-    Reconsolidation,
-    Record,
-    ShearTest,
-)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from ._results import (
+        CompressionTest,
+        CyclicTest,
+        ModulusReduction,
+        PathTest,
+        Reconsolidation,
+        Record,
+        ShearTest,
+    )
 
 # Length of an axis over its largest value.
 _MARGIN = 1.05
@@ -102,8 +104,8 @@ def _drawn(
     test: Record, reference: object | None, panels: list[tuple[str, str]], shape: tuple[int, int]
 ) -> Figure:
     rows, columns = shape
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(1.0 + 3.8 * columns, 0.6 + 2.9 * rows), layout="constrained")
+    with styled():
+        figure = new_figure(1.0 + 3.8 * columns, 0.6 + 2.9 * rows)
         for axes, names in zip(figure.subplots(rows, columns).flat, panels, strict=True):
             _draw(axes, test, names, {"color": OURS, "label": "sandboil"})
             if reference is not None:

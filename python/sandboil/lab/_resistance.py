@@ -14,7 +14,7 @@ from pydantic import Field, PlainValidator
 from .._errors import InvalidInput
 from .._types import Floats, Number
 from ..scene.soils import PM4Sand
-from . import correlations
+from . import _resistance_plots, correlations
 from ._arguments import (
     Bias,
     Count,
@@ -263,9 +263,7 @@ class ResistanceCurve(Table):
 
     def plot(self) -> Figure:
         """Plot CSR against cycles on a logarithmic axis; a matplotlib figure."""
-        from ._resistance_plots import resistance
-
-        return resistance(self)
+        return _resistance_plots.resistance(self)
 
 
 @checked
@@ -343,9 +341,7 @@ class FactorCurve(Table):
 
     def plot(self) -> Figure:
         """Plot the factor and the published factor; a matplotlib figure."""
-        from ._resistance_plots import factor
-
-        return factor(self)
+        return _resistance_plots.factor(self)
 
 
 @checked

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 
-from .._style import INPUT, OURS, REFERENCE, STYLE
+from .._style import INPUT, OURS, REFERENCE, new_figure, styled
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ._resistance import FactorCurve, ResistanceCurve
 
 _MARKERS = ("o", "s", "^")
@@ -21,8 +20,10 @@ _COLOURS = (OURS, "#009E73", INPUT)
 
 def resistance(curve: ResistanceCurve, target: tuple[float, float] | None = None) -> Figure:
     """CSR against cycles for each criterion; `target`: the point (cycles, CSR) of a calibration."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(5.6, 4.0), layout="constrained")
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    with styled():
+        figure = new_figure(5.6, 4.0)
         axes = figure.subplots()
         for (name, cycles), marker, colour in zip(curve.cycles.items(), _MARKERS, _COLOURS, strict=True):
             order = np.argsort(cycles)
@@ -41,8 +42,8 @@ def resistance(curve: ResistanceCurve, target: tuple[float, float] | None = None
 
 def factor(curve: FactorCurve) -> Figure:
     """A correction factor on cyclic resistance and the published factor."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(5.0, 3.6), layout="constrained")
+    with styled():
+        figure = new_figure(5.0, 3.6)
         axes = figure.subplots()
         axes.plot(curve.x, curve.published, color=REFERENCE, ls="--", label=curve.source)
         axes.plot(curve.x, curve.factor, marker="o", ms=4.0, color=OURS, label="PM4Sand")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .. import _core
 from .._errors import InvalidInput
 from .._types import Floats
+from . import _plots
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -101,9 +102,7 @@ class ShearTest(Record):
 
         Returns a matplotlib figure. `reference` as for :meth:`CyclicTest.plot`, without `cycle`.
         """
-        from ._plots import monotonic
-
-        return monotonic(self, reference)
+        return _plots.monotonic(self, reference)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -188,9 +187,7 @@ class CyclicTest(ShearTest):
         `gamma`, `tau`, `sigma_v_eff`, `r_u` and `cycle` (drained: `eps_v` instead of `r_u`) as attributes or
         keys.
         """
-        from ._plots import cyclic
-
-        return cyclic(self, reference)
+        return _plots.cyclic(self, reference)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -247,9 +244,7 @@ class PathTest(Record):
         Returns a matplotlib figure. `reference` is added to each plot; it must have `gamma_xy`, `tau_xy`,
         `mean` and `volume`.
         """
-        from ._plots import path
-
-        return path(self, reference)
+        return _plots.path(self, reference)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -295,9 +290,7 @@ class CompressionTest(Record):
 
         Returns a matplotlib figure. `reference` is added to each plot; it must have arrays of the same names.
         """
-        from ._plots import compression
-
-        return compression(self, reference)
+        return _plots.compression(self, reference)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -325,9 +318,7 @@ class Reconsolidation(Record):
 
         Returns a matplotlib figure. `reference` is added to each plot; it must have arrays of the same names.
         """
-        from ._plots import reconsolidation
-
-        return reconsolidation(self, reference)
+        return _plots.reconsolidation(self, reference)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -362,6 +353,4 @@ class ModulusReduction(Record):
         Returns a matplotlib figure. `reference` is added to each plot; it must have `gamma`, `G_ratio` and
         `damping`.
         """
-        from ._plots import modulus
-
-        return modulus(self, reference)
+        return _plots.modulus(self, reference)

@@ -11,18 +11,13 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
 import shapely
-from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap
-from matplotlib.figure import Figure
-from matplotlib.patches import Polygon as Patch
-from matplotlib.ticker import MaxNLocator
 
 from .._errors import InvalidInput
-from .._style import DPI, INPUT, OURS, REFERENCE, STYLE
+from .._style import DPI, INPUT, OURS, REFERENCE, new_figure, styled
 from .._types import Floats
 from ..files.input_file import read_text
 from ..motion import Motion
@@ -31,10 +26,14 @@ from ..motion._series import butterworth
 from ..scene.stages import RunOut
 from .reader import PGA_CORNER, PGA_ORDER, Run, interval_of
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 FOLDER = "plots"
 
 # Colour of air and of water, and of conditions (Okabe and Ito 2008, without the phreatic line's and black).
-_WATER = LinearSegmentedColormap.from_list("water", ["#F5F0E6", "#9CCBEB"])
+_WATER = ("#F5F0E6", "#9CCBEB")
 _CONDITIONS = ("#0072B2", "#009E73", "#CC79A7", "#E69F00", "#F0E442")
 # Lines of equal head at most.
 _HEAD_LINES = 12
@@ -110,7 +109,7 @@ def plot(
     ------
     InvalidInput : a run without shaking and without seepage, a folder that cannot be written
     """
-    with mpl.rc_context(STYLE):
+    with styled():
         figures = {"seepage": seepage(run)} if run.discharge else {}
         if _shaken_stages(run) or stage is not None or not figures:
             figures |= _shaking_figures(run, reference, _shaken_stage(run, stage))
@@ -187,7 +186,7 @@ def run_out(run: Run, *, stage: str | None = None) -> Figure:
     left, right = min(x0, float(front[0])), max(x1, float(front[1]))
     bottom, height = outline.base[:, 1].min(), np.ptp(edge[:, 1])
     panel = float(np.clip(10.0 * height / (right - left), 0.8, 4.0))
-    figure = Figure(figsize=(10.0, 3.0 * (panel + 0.6)), layout="constrained")
+    figure = new_figure(10.0, 3.0 * (panel + 0.6))
     panels = figure.subplots(3, 1, sharex=True, sharey=True)
     for axes, time, places, value in zip(panels, moments, moved, values, strict=True):
         image = axes.scatter(*places.T, c=value, s=5.0, cmap="viridis", vmin=low, vmax=top, linewidths=0.0)
@@ -202,18 +201,23 @@ def run_out(run: Run, *, stage: str | None = None) -> Figure:
 
 def seepage(run: Run) -> Figure:
     """Where a seepage stage has brought the water: heads, phreatic line, saturation, and discharges."""
+    from matplotlib.colors import LinearSegmentedColormap
+    from matplotlib.patches import Polygon as Patch
+    from matplotlib.ticker import MaxNLocator
+
     water, stage = run.scene.water, run.scene.seepage
     if water is None or stage is None or not run.discharge:
         known = ", ".join(run.stages) or "none"
         raise InvalidInput("stage", "seepage", f"must be a stage of the run: {known}")
     x, y, head = _raster(run, run.seepage_field("head"))
     _, _, saturation = _raster(run, run.seepage_field("saturation"))
-    figure = Figure(figsize=_size_of(run, len(stage.conditions)), layout="constrained")
+    figure = new_figure(*_size_of(run, len(stage.conditions)))
     axes = figure.subplots()
     edge = shapely.get_coordinates(run.scene.section.exterior)
     section = axes.add_patch(Patch(edge, facecolor="none", edgecolor="black", lw=0.8))
+    colours = LinearSegmentedColormap.from_list("water", _WATER)
     shading = axes.pcolormesh(
-        x, y, saturation, shading="nearest", cmap=_WATER, vmin=0.0, vmax=1.0, rasterized=True
+        x, y, saturation, shading="nearest", cmap=colours, vmin=0.0, vmax=1.0, rasterized=True
     )
     figure.colorbar(shading, ax=axes, label="degree of saturation", shrink=0.8, pad=0.01)
     shading.set_clip_path(section)
@@ -282,7 +286,7 @@ def surface(run: Run, *, reference: Reference | None = None, stage: str | None =
     stage = _shaken_stage(run, stage)
     history = run.history("acceleration_x", stage=stage, unit="g")
     motion = run.motion(stage)
-    figure = Figure(figsize=(11.0, 4.5), layout="constrained")
+    figure = new_figure(11.0, 4.5)
     panels = figure.subplot_mosaic("AC;BC", width_ratios=[1.4, 1.0], height_ratios=[2.0, 1.0])
     top, bottom, right = panels["A"], panels["B"], panels["C"]
 
@@ -330,7 +334,7 @@ def pore_pressure(run: Run, *, reference: Reference | None = None, stage: str | 
     """Excess pore pressure ratio over time at the output depths, one panel each."""
     stage = _shaken_stage(run, stage)
     depths = run.scene.output.depths
-    figure = Figure(figsize=(8.0, 1.0 + 1.7 * len(depths)), layout="constrained")
+    figure = new_figure(8.0, 1.0 + 1.7 * len(depths))
     panels = figure.subplots(len(depths), 1, sharex=True, squeeze=False)[:, 0]
     for axes, depth in zip(panels, depths, strict=True):
         history = run.history("r_u", depth=depth, stage=stage)
@@ -353,7 +357,7 @@ def column(run: Run, *, stage: str | None = None) -> Figure:
     stage = _shaken_stage(run, stage)
     times = run.frame_times(stage)
     wet = run.scene.water is not None
-    figure = Figure(figsize=(9.5 if wet else 4.5, 5.2), layout="constrained")
+    figure = new_figure(9.5 if wet else 4.5, 5.2)
     if wet:
         left, right = figure.subplots(1, 2, width_ratios=[1.7, 1.0])
         _draw_map(run, stage, times, left)
@@ -371,7 +375,7 @@ def section(run: Run, *, stage: str | None = None) -> Figure:
     moved = run.position + displacement
     width = 10.0
     height = float(np.clip(width * (y1 - y0) / (x1 - x0), 2.0, width))
-    figure = Figure(figsize=(width, height + 1.0), layout="constrained")
+    figure = new_figure(width, height + 1.0)
     axes = figure.subplots()
     edge = np.vstack([outline.base, outline.surface[::-1], outline.base[:1]])
     size = 100.0 * np.hypot(displacement[:, 0], displacement[:, 1])
@@ -390,7 +394,7 @@ def energy(run: Run, *, stage: str | None = None) -> Figure:
     """What energy came into the section, and where it went, over time; kinds that stay zero are left out."""
     stage = _shaken_stage(run, stage)
     history = run.energy(stage)
-    figure = Figure(figsize=(8.0, 4.5), layout="constrained")
+    figure = new_figure(8.0, 4.5)
     axes = figure.subplots()
     taken = "velocity filter and Rayleigh damping"
     if _is_run_out(run, stage):
@@ -418,8 +422,8 @@ def neighbourhood(place: Floats, speed: Floats, stress: Floats, told: str, path:
     With their speed (m/s, n) and vertical effective stress (kPa, n); values that are not finite are crosses.
     Raises :class:`OSError`.
     """
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 4.8), layout="constrained")
+    with styled():
+        figure = new_figure(10.0, 4.8)
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         labels = ("speed, m/s", "vertical effective stress, kPa")
         for axes, values, label in zip(panels, (speed, stress), labels, strict=True):
@@ -456,6 +460,8 @@ def _draw_map(run: Run, stage: str, times: Floats, axes: Axes) -> None:
 
 def _draw_sway(run: Run, stage: str, times: Floats, axes: Axes) -> None:
     """Horizontal displacement against the base, cm, at times spread over strong shaking, and at the end."""
+    from matplotlib import colormaps
+
     nodes = run.column()
     profile = run.profile("displacement", stage=stage)
     begin, end = _strong_part(run.motion(stage), times)
@@ -463,7 +469,7 @@ def _draw_sway(run: Run, stage: str, times: Floats, axes: Axes) -> None:
     frames = sorted({int(np.argmin(np.abs(times - time))) for time in wanted})
     displacement = run.field_series("displacement", stage=stage)[:, nodes, 0]
     sway = 100.0 * (displacement - displacement[:, -1:])[frames]
-    colours = mpl.colormaps["plasma"](np.linspace(0.0, 0.85, len(frames)))
+    colours = colormaps["plasma"](np.linspace(0.0, 0.85, len(frames)))
     for frame, values, colour in zip(frames, sway, colours, strict=True):
         axes.plot(values, profile.depth, color=colour, label=f"{times[frame]:.1f} s")
     height = profile.depth[-1] - profile.depth[0]
@@ -505,7 +511,7 @@ def stress_paths(run: Run, *, reference: Reference | None = None, stage: str | N
     """Shear stress against vertical effective stress and against shear strain at the output depths."""
     stage = _shaken_stage(run, stage)
     depths = run.scene.output.depths
-    figure = Figure(figsize=(9.0, 0.6 + 2.5 * len(depths)), layout="constrained")
+    figure = new_figure(9.0, 0.6 + 2.5 * len(depths))
     panels = figure.subplots(len(depths), 2, squeeze=False)
     for (left, right), depth in zip(panels, depths, strict=True):
         tau, sigma, gamma = (

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from .._errors import SimulationDiverged
 from .._types import Floats
 from ..core.simulation import FIELDS, VECTOR_FIELDS, Simulation
+from ..results.plots import neighbourhood as draw
 
 FILE_NAME = "neighbourhood.csv"
 PICTURE_NAME = "neighbourhood.png"
@@ -72,9 +73,6 @@ def write(folder: Path, simulation: Simulation, error: SimulationDiverged) -> li
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(zip(*(np.asarray(values).tolist() for values in columns.values()), strict=True))
-    # As soon as there is something to draw, which hopefully is never: it takes a second to load.
-    from ..results.plots import neighbourhood
-
     speed: Floats = np.linalg.norm(fields["velocity"][nodes], axis=1)
-    neighbourhood(rest[nodes], speed, fields["sigma_v_eff"][nodes], str(error), paths[1])
+    draw(rest[nodes], speed, fields["sigma_v_eff"][nodes], str(error), paths[1])
     return paths
