@@ -33,7 +33,10 @@ from sandboil import (
     discretise,
     polygon,
 )
-from sandboil.core.simulation import _description, _moving_description, doubts, loaded_motions, probes_of
+from sandboil.core.description import section_description, stage_description
+from sandboil.core.doubts import doubts
+from sandboil.core.motions import loaded_motions
+from sandboil.core.probes import probes_of
 from sandboil.run import plan
 
 ROCK = Elastic(E=2.0e5, nu=0.3)
@@ -57,14 +60,12 @@ def shaken(*args: Any, **kwargs: Any) -> list[Gravity | Shaking]:
 
 
 def sent(scene: Scene) -> dict[str, Any]:
-    """What the core is told of the shaking stage."""
+    """The shaking stage as the core takes it."""
     stage, motions = scene.stages[1], loaded_motions(scene)[1]
-    assert isinstance(stage, Shaking)
-    assert motions is not None
     probes = probes_of(scene, discretise(scene))
-    duration = scene.duration(stage)
-    assert duration is not None
-    return _moving_description(scene, stage, duration, motions.waves(), probes)
+    described = stage_description(scene, stage, scene.duration(stage), motions, probes)
+    assert described is not None
+    return described
 
 
 # Outline
@@ -219,7 +220,7 @@ def test_the_core_is_told_base_and_sides() -> None:
     scene = slope(
         sides=Sides(FreeField(), Fixed()), stages=[Gravity(base="free-slip"), Shaking(duration=1.0)]
     )
-    told = _description(scene, discretise(scene))
+    told = section_description(scene, discretise(scene))
     assert told["period"] is None
     assert told["base_support"] == "free-slip"
     assert told["left"] == {"x": 0.0, "bottom": 0.0, "top": 12.0, "support": "roller"}
@@ -231,7 +232,7 @@ def test_the_core_is_told_base_and_sides() -> None:
 
 def test_level_ground_is_told_as_a_period() -> None:
     scene = slope([(0, 0), (4, 0), (4, 6), (0, 6)], sides=Periodic())
-    told = _description(scene, discretise(scene))
+    told = section_description(scene, discretise(scene))
     assert (told["period"], told["left"], told["right"]) == (4.0, None, None)
     np.testing.assert_array_equal(told["base"], [(0, 0), (4, 0)])
     stage = sent(scene)

@@ -24,7 +24,7 @@ from sandboil import (
     polygon,
     run,
 )
-from sandboil.core.simulation import ENERGY
+from sandboil.core.quantities import ENERGY
 
 # What damping takes without filter and Rayleigh damping, over what came in at most: the error of the balance.
 # Works are second order in the strain of a step.

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 import scenes
 from sandboil import Gravity, InvalidInput, Run, Scene, Shaking, _core, load, response_spectrum, run
-from sandboil.results.reader import FILE_NAME, FORMAT_VERSION, Summary
+from sandboil.results.layout import FILE_NAME, FORMAT_VERSION
+from sandboil.results.summary import Summary
 
 # The file
 

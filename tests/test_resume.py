@@ -33,12 +33,12 @@ from sandboil import (
     run,
 )
 from sandboil.files.committed_file import CommittedFile, twin_of
-from sandboil.results import reader as results
-from sandboil.results.reader import FILE_NAME
+from sandboil.results import writer
+from sandboil.results.layout import FILE_NAME
 from sandboil.run import checkpoint as checkpoints
 from sandboil.run.columns import FILE_NAME as COLUMNS
 
-COMMIT_INTERVAL = results._COMMIT_INTERVAL
+COMMIT_INTERVAL = writer._COMMIT_INTERVAL
 HERE = Path(__file__).parent
 
 # A run in a process of its own that commits every frame and stores its state all the time.
@@ -46,8 +46,8 @@ RUNNING = """
 import sys, warnings
 import scenes
 from sandboil import run
-from sandboil.results import reader as results
-results._COMMIT_INTERVAL = 0.0
+from sandboil.results import writer
+writer._COMMIT_INTERVAL = 0.0
 folder, threads, resume = sys.argv[1:]
 warnings.simplefilter("ignore")
 run(scenes.column(), folder, threads=int(threads), resume=resume == "resume", checkpoint_seconds=0.02)
@@ -218,7 +218,7 @@ def test_a_run_killed_at_its_very_end_has_only_to_say_so(
         raise Killed
 
     with monkeypatch.context() as patch:
-        patch.setattr(results.Writer, "close", closing)
+        patch.setattr(writer.Writer, "close", closing)
         with pytest.raises(Killed):
             run(scenes.column(), tmp_path, threads=1)
     assert load(tmp_path).status == "running"
@@ -517,7 +517,7 @@ def stopped_on_full_disk(disk: Path, left: int, monkeypatch: pytest.MonkeyPatch)
     """Run on a disk with so much room; what stands there afterwards can be read."""
     ballast = fill(disk, left)
     with monkeypatch.context() as patch:
-        patch.setattr(results, "_COMMIT_INTERVAL", 0.0)
+        patch.setattr(writer, "_COMMIT_INTERVAL", 0.0)
         with pytest.raises(SandboilError, match="No space left on device") as told:
             run(scenes.column(), disk / "out", threads=1, checkpoint_time=0.05)
     ballast.unlink()
@@ -620,7 +620,7 @@ def test_states_and_commits_of_a_large_section_take_below_two_per_cent(
 
     timed(sb.Simulation, "store")
     timed(CommittedFile, "commit")
-    monkeypatch.setattr(results, "_COMMIT_INTERVAL", 0.0)
+    monkeypatch.setattr(writer, "_COMMIT_INTERVAL", 0.0)
     run(scene, tmp_path, threads=2, checkpoint_time=0.02)
     (size,) = {path.stat().st_size for path in (tmp_path / checkpoints.FOLDER_NAME).glob("shaking*")}
     store, commit = (float(np.median(spent[name])) for name in ("store", "commit"))

@@ -19,7 +19,9 @@ from ._errors import (
 from .core.simulation import Simulation
 from .ground.discretise import Discretisation, discretise
 from .motion import Motion, ResponseSpectrum, response_spectrum
-from .results.reader import History, Profile, Run, Summary, Surface, load
+from .results.reader import Run, load
+from .results.records import History, Profile, Surface
+from .results.summary import Summary
 from .run.plan import Plan
 from .run.run import run
 from .scene.conditions import Drain, Flux, Head, Pressure, Rain, Reservoir, SeepageFace

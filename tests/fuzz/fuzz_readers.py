@@ -42,6 +42,7 @@ from sandboil import _core
 from sandboil._errors import DamagedState, InvalidInput
 from sandboil.cli.lab import _strains
 from sandboil.core.simulation import Simulation
+from sandboil.files import toml
 from sandboil.files.hdf5 import LAYOUT
 from sandboil.results import plots
 from sandboil.results import reader as results
@@ -470,7 +471,7 @@ def readers(folder: Path) -> dict[str, Callable[[], Reader]]:
         "toml": lambda: Reader(_scenes(), sb.Scene.from_toml, "scene.toml", is_toml=True),
         "soil": lambda: Reader(
             [SOIL],
-            lambda path: material(sb._toml.parse(sb._toml.read(path, "soil"), "soil", "")),
+            lambda path: material(toml.parse(toml.read(path, "soil"), "soil", "")),
             "soil.toml",
             is_toml=True,
         ),

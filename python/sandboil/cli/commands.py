@@ -18,11 +18,13 @@ from .._errors import (
     SandboilWarning,
     SuctionWarning,
 )
-from ..core.simulation import doubts, loaded_motions
+from ..core.doubts import doubts
+from ..core.motions import loaded_motions
 from ..motion import Kind, Motion
+from ..results.layout import FILE_NAME
 from ..results.plots import Reference
 from ..results.plots import plot as draw
-from ..results.reader import FILE_NAME, load
+from ..results.reader import load
 from ..run import checkpoint
 from ..run.accuracy import Accuracy
 from ..run.plan import plan as plan_of

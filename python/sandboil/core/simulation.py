@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,14 +15,24 @@ from .. import _core
 from .._errors import InvalidInput, SandboilError, SandboilWarning, SuctionWarning, unknown_name
 from .._types import Floats
 from ..files.fingerprint import fingerprint
-from ..ground.discretise import Discretisation, discretise
-from ..motion import Motion
+from ..ground.discretise import discretise
 from ..run.columns import HANDS, ColumnRecord
 from ..run.columns import INTERVAL as COLUMN_INTERVAL
 from ..run.columns import key as column_key
 from ..run.columns import load as load_columns
-from ..scene.region import Region
-from ..scene.stages import AnyStage, Gravity, RunOut, Seepage, Shaking
+from ..scene.stages import AnyStage, Gravity, Seepage
+from .description import condition_description, section_description, stage_description
+from .doubts import doubts
+from .motions import loaded_motions
+from .probes import probes_of
+from .quantities import (
+    ACCELERATED_FLOW,
+    CHANNELS,
+    ENVELOPES,
+    SEEPAGE_FIELDS,
+    moving_fields,
+    pore_pressure_ratio,
+)
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
@@ -34,131 +43,12 @@ LOOK_INTERVAL = 0.1
 # Most threads: beyond, no section has work enough, and starting them takes longer than a run.
 MAX_THREADS = 256
 
-# Velocity at the end of a motion over its peak beyond which it is told. The ground is then stopped within a
-# sample, by a wave of stress rho Vs v: up to this share it is lost in what the shaking itself does. Records
-# that were baseline corrected end far below.
-RESIDUAL_VELOCITY = 0.02
-
 # Names in :attr:`Simulation.fingerprints` beside those of the section's parts.
 STAGE_PREFIX = "stages."
 OUTPUT = "output"
 
-# The core's name of the flow scheme with the acceleration of the pore water.
-ACCELERATED_FLOW = "explicit with acceleration term"
-
 # More steps than any stage makes; the core counts in 64 bits.
 _NO_LIMIT = 2**62
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """What a stored quantity is: its unit and one line about it, with its sign."""
-
-    unit: str
-    description: str
-
-
-# Every quantity that can be read of a run, in the order in which it is written.
-FIELDS: dict[str, Quantity] = {
-    "displacement": Quantity("m", "since the scene was made, (x, y)"),
-    "velocity": Quantity("m/s", "(x, y)"),
-    "acceleration": Quantity("m/s2", "(x, y)"),
-    "excess_pore_pressure": Quantity("kPa", "since shaking began, compression positive"),
-    "pore_pressure": Quantity("kPa", "at rest and excess, compression positive, suction negative"),
-    "head": Quantity("m", "total head, pressure head and elevation"),
-    "saturation": Quantity("1", "water per volume of pores"),
-    "r_u": Quantity("1", "excess pore pressure over the geostatic vertical effective stress"),
-    "r_u_stress": Quantity("1", "one minus vertical effective stress over its geostatic value"),
-    "sigma_v_eff": Quantity("kPa", "vertical effective stress, compression positive"),
-    "sigma_h_eff": Quantity("kPa", "horizontal effective stress, compression positive"),
-    "p_eff": Quantity(
-        "kPa", "mean (sigma_v_eff + sigma_h_eff)/2 in the plane, as in PM4Sand, compression positive"
-    ),
-    "tau_xy": Quantity("kPa", "shear stress, positive with a positive gamma_xy"),
-    "gamma_xy": Quantity("1", "engineering shear strain since the stage began"),
-    "gamma_max": Quantity("1", "largest engineering shear strain in the plane since the stage began"),
-}
-
-# Fields that exist only with water.
-WATER_FIELDS = ("excess_pore_pressure", "pore_pressure", "r_u")
-
-# Fields of water that flows through ground at rest.
-SEEPAGE_FIELDS = ("pore_pressure", "head", "saturation")
-
-# Fields with two components.
-VECTOR_FIELDS = ("displacement", "velocity", "acceleration")
-
-# Fields of which the largest value over all steps can be kept.
-ENVELOPES = ("r_u", "gamma_max")
-
-# The core's history channels: the name here, and the factor that turns its tension positive into ours.
-_CHANNELS: dict[str, tuple[str, float]] = {
-    "stress_xx": ("sigma_h_eff", -1.0),
-    "stress_yy": ("sigma_v_eff", -1.0),
-    "stress_xy": ("tau_xy", 1.0),
-    "strain_xx": ("epsilon_h", -1.0),
-    "strain_yy": ("epsilon_v", -1.0),
-}
-
-# What histories hold besides the components of the fields.
-HISTORIES: dict[str, Quantity] = {
-    **{
-        f"{name}_{axis}": Quantity(FIELDS[name].unit, f"{axis} component")
-        for name in ("acceleration", "velocity", "displacement")
-        for axis in "xy"
-    },
-    **{name: FIELDS[name] for name in (*WATER_FIELDS, "r_u_stress", "sigma_v_eff", "sigma_h_eff", "tau_xy")},
-    "epsilon_h": Quantity("1", "horizontal strain since the stage began, shortening positive"),
-    "epsilon_v": Quantity("1", "vertical strain since the stage began, shortening positive"),
-    "gamma_xy": FIELDS["gamma_xy"],
-}
-
-# Histories that are kept only if `output.stress_paths` is set.
-STRESS_HISTORIES = (
-    "r_u_stress",
-    "sigma_v_eff",
-    "sigma_h_eff",
-    "tau_xy",
-    "epsilon_h",
-    "epsilon_v",
-    "gamma_xy",
-)
-
-
-# What is kept of energy and mass in a stage of shaking, in the core's order. Works count from its beginning.
-ENERGY: dict[str, Quantity] = {
-    "kinetic": Quantity("kJ/m", "kinetic energy"),
-    "stress": Quantity("kJ/m", "done on the soil by effective stress: stored, and lost in plasticity"),
-    "water": Quantity("kJ/m", "given to the pore water beyond its state at rest"),
-    "damping": Quantity("kJ/m", "taken by the velocity filter and Rayleigh damping"),
-    "local_damping": Quantity("kJ/m", "taken by local damping"),
-    "constant_forces": Quantity("kJ/m", "done by gravity and the reactions stored at rest"),
-    "base": Quantity("kJ/m", "brought in through the base, less what leaves there"),
-    "sides": Quantity("kJ/m", "brought in through free-field sides, less what leaves there"),
-    "renewal": Quantity("kJ/m", "kinetic energy gained where a renewed geometry changes masses"),
-    "solid_mass": Quantity("Mg/m", "mass of the grains"),
-    "water_mass": Quantity("Mg/m", "mass of water that fills the pores, as of the last geometry"),
-}
-
-
-@dataclass(frozen=True)
-class Probe:
-    """A point where histories are taken: its initial place (m) and how the scene speaks of it."""
-
-    label: str
-    x: float
-    y: float
-
-
-def probes_of(scene: Scene, particles: Discretisation) -> list[Probe]:
-    """Where the histories of a scene are taken: surface, base and depths in the mid column, then points."""
-    x0, _, x1, _ = scene.bounds
-    x = 0.5 * (x0 + x1)
-    surface = float(particles.overburden.surface_elevation(np.array([x]))[0])
-    column = [("surface", surface), ("base", scene.outline.base_elevation(x))]
-    column += [(f"depth {depth:g} m", surface - depth) for depth in scene.output.depths]
-    points = [(f"point ({px:g}, {py:g}) m", px, py) for px, py in scene.output.points]
-    return [*(Probe(label, x, y) for label, y in column), *(Probe(*point) for point in points)]
 
 
 class Simulation:
@@ -209,11 +99,10 @@ class Simulation:
         loaded = loaded_motions(scene)
         self.motions = [None if motions is None else motions.main for motions in loaded]
         self._durations = [scene.duration(stage) for stage in scene.stages]
-        self._waves = [None if motions is None else motions.waves() for motions in loaded]
         self.doubts = doubts(scene, loaded)
         for doubt in self.doubts:
             warnings.warn(doubt, SandboilWarning, stacklevel=2)
-        self._section = _description(scene, self.particles)
+        self._section = section_description(scene, self.particles)
         if scene.seepage is not None and (columns is not None or keep_columns):
             name, value = ("columns", columns) if columns is not None else ("keep_columns", keep_columns)
             raise InvalidInput(
@@ -221,10 +110,8 @@ class Simulation:
             )
         self.threads = threads
         self._stages = [
-            None
-            if duration is None or not isinstance(stage, Shaking | RunOut)
-            else _moving_description(scene, stage, duration, waves, self.probes)
-            for stage, duration, waves in zip(scene.stages, self._durations, self._waves, strict=True)
+            stage_description(scene, stage, duration, motions, self.probes)
+            for stage, duration, motions in zip(scene.stages, self._durations, loaded, strict=True)
         ]
         self._water: _core.Seepage | None = None
         self._grains: _core.Simulation | None = None
@@ -246,6 +133,16 @@ class Simulation:
     def present_stage(self) -> AnyStage:
         """The present stage."""
         return self.scene.stages[self._index]
+
+    @property
+    def progress(self) -> str:
+        """How far the present stage has come, for people."""
+        stage = self.present_stage
+        if self.duration is not None:
+            return f"{self.time:.2f} of {self.duration:g} s"
+        if isinstance(stage, Gravity):
+            return f"unbalanced {self.residual:.1e} of gravity, {stage.tolerance:.0e} wanted"
+        return f"iteration {self.steps}"
 
     @property
     def time(self) -> float:
@@ -270,6 +167,16 @@ class Simulation:
     def undamped_dt(self) -> float | None:
         """Time step that the stage would have without its Rayleigh damping, s; None if it has none."""
         return None if self._grains is None else self._grains.undamped_time_step
+
+    @property
+    def is_seeping(self) -> bool:
+        """Whether the present stage is of water alone: the grains do not exist yet."""
+        return self._grains is None
+
+    @property
+    def follows_seepage(self) -> bool:
+        """Whether the present stage is the first one on the water of a seepage stage."""
+        return self._index == 1 and self.scene.seepage is not None
 
     @property
     def steps(self) -> int:
@@ -369,7 +276,7 @@ class Simulation:
     def fingerprints(self) -> dict[str, str]:
         """What tells this scene from others: of each part of the section, each stage and the output."""
         stages = (
-            stage.model_dump() if isinstance(stage, (Gravity, Seepage)) else described
+            stage.model_dump() if described is None else described
             for stage, described in zip(self.scene.stages, self._stages, strict=True)
         )
         return {
@@ -395,9 +302,9 @@ class Simulation:
 
     def _begin_next_stage(self) -> None:
         self._index += 1
-        stage = self.scene.stages[self._index]
+        stage, description = self.present_stage, self._stages[self._index]
         if isinstance(stage, Seepage):
-            conditions = [_condition(self.scene, condition) for condition in stage.conditions]
+            conditions = [condition_description(self.scene, condition) for condition in stage.conditions]
             pressure = self.particles.pore_pressure0
             self._water = _core.Seepage(self._section, pressure, conditions, stage.duration)
             return
@@ -405,17 +312,15 @@ class Simulation:
             self._grains = _core.Simulation(self._with_water_of_seepage(), self.threads)
         if isinstance(stage, Gravity):
             self._grains.begin_gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
-            return
-        moving = self._stages[self._index]
-        assert moving is not None
-        self._grains.begin_shaking(moving)
+        elif description is not None:
+            self._grains.begin_shaking(description)
 
     def _with_water_of_seepage(self) -> dict[str, Any]:
         """The section at rest with the water that its seepage stage has left."""
         assert self._water is not None
         pressure, saturation = self._water.pore_pressure(), self._water.saturation()
         self.particles = self.particles.with_pore_water(pressure, saturation)
-        return _description(self.scene, self.particles)
+        return section_description(self.scene, self.particles)
 
     @property
     def _present(self) -> _core.Simulation | _core.Seepage:
@@ -437,21 +342,19 @@ class Simulation:
         """Stage, side and fingerprint of every free-field column; stages are told which to read and keep."""
         if read is None and not keep:
             return []
-        sides = [
-            hand for hand, kind in zip(HANDS, self.scene.side_kinds, strict=True) if kind == "free-field"
+        stages = dict(zip(self.scene.stage_names, self._stages, strict=True))
+        keys = [
+            (name, hand, column_key(section, stage, hand, self.scene.statics.tolerance))
+            for name, stage in stages.items()
+            if stage is not None
+            for hand, side in zip(HANDS, stage["sides"], strict=True)
+            if side == "free-field"
         ]
-        if not sides:
+        if not keys:
             name, value = ("columns", str(read)) if read is not None else ("keep_columns", keep)
             raise InvalidInput(
                 name, value, "goes with free-field sides, of which the scene has none", "leave it out"
             )
-        stages = dict(zip(self.scene.stage_names, self._stages, strict=True))
-        keys = [
-            (name, hand, column_key(section, stage, hand, _gravity(self.scene).tolerance))
-            for name, stage in stages.items()
-            if stage is not None
-            for hand in sides
-        ]
         found = {} if read is None else load_columns(Path(read), keys)
         for name, stage in stages.items():
             if stage is not None:
@@ -476,7 +379,7 @@ class Simulation:
     @property
     def field_names(self) -> list[str]:
         """Names that :meth:`field` knows in this scene."""
-        return list(SEEPAGE_FIELDS) if self._grains is None else _moving_fields(self.scene)
+        return list(SEEPAGE_FIELDS) if self._grains is None else moving_fields(self.scene)
 
     def field(self, name: str) -> Floats:
         """A field at the nodes: (n, 2) for displacement, velocity and acceleration, else (n,).
@@ -554,7 +457,7 @@ class Simulation:
         time, values = self._grains.take_histories()
         histories = {}
         for k, channel in enumerate(self._grains.channel_names()):
-            name, factor = _CHANNELS.get(channel, (channel, 1.0))
+            name, factor = CHANNELS.get(channel, (channel, 1.0))
             histories[name] = factor * values[:, :, k] if len(time) else np.empty((0, len(self.probes)))
         return time, histories
 
@@ -653,290 +556,3 @@ class Simulation:
             return self._grains.counters()
         assert self._water is not None
         return {f"seepage_{name}": count for name, count in self._water.counters().items()}
-
-
-def written_fields(scene: Scene) -> list[str]:
-    """Names of the fields that a run of a scene writes: of the water alone if nothing else may move."""
-    return list(SEEPAGE_FIELDS) if scene.is_at_rest else _moving_fields(scene)
-
-
-def _moving_fields(scene: Scene) -> list[str]:
-    absent = {"head"}
-    if scene.water is None:
-        absent |= set(WATER_FIELDS)
-    if not scene.is_partly_saturated:
-        absent.add("saturation")
-    return [name for name in FIELDS if name not in absent]
-
-
-def pore_pressure_ratio(pressure: Floats, sigma_v_eff0: Floats) -> Floats:
-    """Pressure over the geostatic vertical effective stress; nan where that is not positive (the surface)."""
-    positive = sigma_v_eff0 > 0.0
-    ratio: Floats = np.where(positive, pressure / np.where(positive, sigma_v_eff0, 1.0), np.nan)
-    return ratio
-
-
-# Spacing of a wave's samples, s, and its horizontal and vertical velocities, m/s.
-Wave = tuple[float, Floats, Floats | None]
-
-
-@dataclass(frozen=True)
-class StageMotions:
-    """The motions of a shaking stage, read.
-
-    Attributes
-    ----------
-    places : (place in the stage, motion) of each
-    main : the stage's own; None if it has none
-    vertical : its vertical component, if any
-    segments : one for each stretch of the base from left to right; None: that of the stage
-    """
-
-    places: list[tuple[str, Motion]]
-    main: Motion | None
-    vertical: Motion | None
-    segments: list[Motion | None]
-
-    def waves(self) -> tuple[list[Wave], list[int | None]]:
-        """The upgoing waves, and the index of that of each stretch; None where nothing comes."""
-        waves: list[Wave] = []
-        upgoing = [
-            None if motion is None else motion.upgoing_velocity() for motion in (self.main, self.vertical)
-        ]
-        horizontal, vertical = (None if wave is None else np.ascontiguousarray(wave[1]) for wave in upgoing)
-        dt = next((wave[0] for wave in upgoing if wave is not None), None)
-        if dt is not None:
-            waves.append((dt, np.zeros(1) if horizontal is None else horizontal, vertical))
-        of_stage = len(waves) - 1 if waves else None
-        indices: list[int | None] = []
-        for motion in self.segments:
-            if motion is None:
-                indices.append(of_stage)
-            else:
-                own, velocity = motion.upgoing_velocity()
-                indices.append(len(waves))
-                waves.append((own, np.ascontiguousarray(velocity), None))
-        return waves, indices
-
-
-def loaded_motions(scene: Scene) -> list[StageMotions | None]:
-    """The motions of every shaking stage; what is wrong with one is told with its stage."""
-    return [
-        _stage_motions(scene, stage, f"scene.stages[{i}].") if isinstance(stage, Shaking) else None
-        for i, stage in enumerate(scene.stages)
-    ]
-
-
-def _stage_motions(scene: Scene, stage: Shaking, path: str) -> StageMotions:
-    loaded: dict[str, Motion] = {}
-    for place, spec in stage.motions:
-        if spec is None:
-            continue
-        try:
-            loaded[place] = spec.load()
-            loaded[place].upgoing_velocity()
-        except InvalidInput as error:
-            # A file's own place, line and all, follows the stage's.
-            rest = error.path.removeprefix("motion")
-            told = rest if rest != error.path else f", {error.path}"
-            raise InvalidInput(f"{path}{place}{told}", error.value, error.allowed, error.hint) from None
-    main, vertical = loaded.get("motion"), loaded.get("vertical")
-    if main is not None and vertical is not None and not math.isclose(main.dt, vertical.dt):
-        raise InvalidInput(
-            f"{path}vertical.dt",
-            vertical.dt,
-            f"must be that of the horizontal motion, {main.dt:g} s",
-            "take both components of the same record",
-        )
-    of_spec = {id(spec): loaded[place] for place, spec in stage.motions if spec is not None}
-    segments = [
-        None if arrival.motion is None else of_spec[id(arrival.motion)] for arrival in scene.arrivals(stage)
-    ]
-    return StageMotions(list(loaded.items()), main, vertical, segments)
-
-
-def doubts(scene: Scene, loaded: list[StageMotions | None]) -> list[str]:
-    """Why the answer may not be what was meant; empty if there is no reason known."""
-    told = []
-    for i, (stage, motions) in enumerate(zip(scene.stages, loaded, strict=True)):
-        if isinstance(stage, Gravity) and stage.base == "free-slip" and not scene.outline.base_is_level:
-            told.append(
-                f"scene.stages[{i}].base = {stage.base!r} above a base that is not level: stresses at rest "
-                "in rows above it alternate by up to 70 %; 'no-slip' leaves 4 %"
-            )
-        if not isinstance(stage, Shaking) or motions is None:
-            continue
-        path = f"scene.stages[{i}]"
-        for place, motion in motions.places:
-            left = float(motion.velocity[-1])
-            if abs(left) > RESIDUAL_VELOCITY * motion.pgv:
-                told.append(
-                    f"{path}.{place} ends with a velocity of {left:.3g} m/s, {abs(left) / motion.pgv:.0%} of "
-                    f"its peak, and a drift of {motion.displacement[-1]:.3g} m: the ground is stopped with a "
-                    "blow and stays displaced; motion.baseline_corrected() takes both away"
-                )
-        for arrival, own in zip(scene.arrivals(stage), motions.segments, strict=True):
-            passing = own or motions.main or motions.vertical
-            if stage.duration is None or passing is None or arrival.latest == 0.0:
-                continue
-            end = arrival.latest + passing.duration
-            if end > stage.duration + passing.dt:
-                told.append(
-                    f"{path}.duration = {stage.duration:g} s ends before the motion has passed the base from "
-                    f"x = {arrival.x[0]:g} to {arrival.x[1]:g} m, which takes {end:.4g} s"
-                )
-    return told
-
-
-def stress_node_positions(particles: Discretisation) -> Floats:
-    """Initial places of the stress nodes, m, (n, 2, 2): node, first or second, (x, y)."""
-    offset = np.array(_core.stress_node_offset(*particles.spacing))
-    places: Floats = particles.position[:, None, :] + offset * np.array([[[1.0], [-1.0]]])
-    return places
-
-
-def _description(scene: Scene, particles: Discretisation) -> dict[str, Any]:
-    """The scene as the numerical core takes it."""
-    x0, x1, _, _ = particles.bounds
-    sigma_v_eff, _ = particles.stress_at(stress_node_positions(particles).reshape(-1, 2))
-    water = scene.water
-    numerics = scene.numerics.model_dump(exclude={"local_damping", "time_step_factor"})
-    numerics["velocity_filter"] = scene.numerics.filter_strength
-    return {
-        "spacing": particles.spacing,
-        "position": particles.position,
-        "volume": particles.volume,
-        "region": particles.region.astype(np.uint32),
-        "regions": [_region(scene, region) for region in scene.regions],
-        "surface_elevation": particles.surface_elevation,
-        "vertical_effective_stress": sigma_v_eff,
-        "pore_pressure": np.empty(0) if water is None else particles.pore_pressure0,
-        "saturation": np.empty(0) if particles.saturation0 is None else particles.saturation0,
-        "water": None if water is None else (water.unit_weight, water.bulk_modulus),
-        "gravity": scene.gravity,
-        "period": x1 - x0 if scene.is_periodic else None,
-        **_edges(scene),
-        "numerics": numerics,
-    }
-
-
-def _edges(scene: Scene) -> dict[str, Any]:
-    """Base and sides as the numerical core takes them, and what they are in statics."""
-    outline, (x0, _, x1, _) = scene.outline, scene.bounds
-    left, right = (
-        _side(kind, x, extent)
-        for kind, x, extent in zip(scene.side_kinds, (x0, x1), (outline.left, outline.right), strict=True)
-    )
-    return {
-        "base": outline.base,
-        "base_support": _gravity(scene).base,
-        "left": left,
-        "right": right,
-    }
-
-
-def _side(kind: str, x: float, extent: tuple[float, float]) -> dict[str, Any] | None:
-    """A side as a wall of the static stage; None between periodic sides."""
-    if kind == "periodic":
-        return None
-    support = "fixed" if kind == "fixed" else "roller"
-    return {"x": x, "bottom": extent[0], "top": extent[1], "support": support}
-
-
-def _moving_description(
-    scene: Scene,
-    stage: Shaking | RunOut,
-    duration: float,
-    waves: tuple[list[Wave], list[int | None]] | None,
-    probes: list[Probe],
-) -> dict[str, Any]:
-    """A stage in which the ground moves as the numerical core takes it."""
-    output = scene.output
-    return {
-        "duration": duration,
-        **(_run_out(scene, stage) if isinstance(stage, RunOut) else _shaking(scene, stage, waves)),
-        "column_records": (None, None),
-        "record_columns": None,
-        "local_damping": scene.numerics.local_damping,
-        "time_step_factor": scene.numerics.time_step_factor,
-        "probes": np.array([(probe.x, probe.y) for probe in probes]),
-        "history_interval": output.history_dt,
-        "stress_histories": output.stress_paths,
-        "pressure_envelope": "r_u" in output.envelopes,
-        "strain_envelope": "gamma_max" in output.envelopes,
-    }
-
-
-def _run_out(scene: Scene, stage: RunOut) -> dict[str, Any]:
-    """What ground that flows is held by and stands in: base and sides are walls, and no wave comes."""
-    x0, _, x1, _ = scene.bounds
-    return {
-        "waves": [],
-        "base": {"vertical": "roller", "half_space": None, "segments": [(x0, x1, None, 0.0, 0.0)]},
-        "sides": ("wall", "wall"),
-        "conditions": [],
-        "rayleigh": None,
-        "run_out": {
-            "viscosity": stage.viscosity,
-            "open": tuple(hand in stage.open_sides for hand in ("left", "right")),
-            "still_water": None
-            if stage.still_water is None
-            else np.array(stage.still_water, dtype=np.float64).reshape(-1, 2),
-        },
-    }
-
-
-def _shaking(
-    scene: Scene, stage: Shaking, waves: tuple[list[Wave], list[int | None]] | None
-) -> dict[str, Any]:
-    """What shakes the ground, and holds it beside."""
-    assert waves is not None
-    base, rayleigh = stage.base, stage.rayleigh
-    left, right = ("free-field" if kind == "free-field" else "wall" for kind in scene.side_kinds)
-    return {
-        "waves": waves[0],
-        "base": {
-            "vertical": stage.base_vertical,
-            "half_space": None if base.Vs is None else (base.Vs, base.Vp, base.density),
-            "segments": [
-                (*arrival.x, wave, arrival.delay, arrival.slowness)
-                for arrival, wave in zip(scene.arrivals(stage), waves[1], strict=True)
-            ],
-        },
-        "sides": (left, right),
-        "conditions": [
-            _condition(scene, condition) | {"at_rest": at_rest}
-            for condition, at_rest in scene.moving_conditions(stage)
-        ]
-        if scene.water is not None
-        else [],
-        "rayleigh": None if rayleigh is None else (rayleigh.ratio, rayleigh.frequencies),
-        "run_out": None,
-    }
-
-
-def _condition(scene: Scene, condition: Any) -> dict[str, Any]:
-    """A hydraulic condition as the numerical core takes it."""
-    line = np.array(scene.condition_line(condition).coords)
-    series = condition.series
-    time, value = zip(*series, strict=True) if series else ((), ())
-    return {"kind": condition.kind, "line": line, "series": (list(time), list(value))}
-
-
-def _gravity(scene: Scene) -> Gravity:
-    """The static stage, or what it would be in a scene that has none."""
-    return next((stage for stage in scene.stages if isinstance(stage, Gravity)), Gravity())
-
-
-def _region(scene: Scene, region: Region) -> dict[str, Any]:
-    soil = region.resolved(scene)
-    poisson = _gravity(scene).initial_poisson_ratio
-    return {
-        "material": region.material.core(),
-        "porosity": soil.porosity,
-        "solid_density": soil.solid_density,
-        "hydraulic_conductivity": region.conductivity,
-        "retention": region.retention.core if region.retention and scene.holds_suction else None,
-        "earth_pressure_coefficient": region.K0,
-        "static_poisson_ratio": region.initial_poisson_ratio if poisson is None else poisson,
-    }

@@ -24,7 +24,10 @@ from ..motion import Motion
 from ..motion._motion import SIGNIFICANT
 from ..motion._series import butterworth
 from ..scene.stages import RunOut
-from .reader import PGA_CORNER, PGA_ORDER, Run, interval_of
+from .layout import Stage
+from .reader import Run
+from .records import interval_of
+from .summary import PGA_CORNER, PGA_ORDER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -231,7 +234,7 @@ def seepage(run: Run) -> Figure:
         axes.plot(*region.geometry.exterior.xy, color="black", lw=0.3)
     axes.plot([], [], color="black", lw=0.5, label="total head, m")
     axes.plot([], [], color=REFERENCE, lw=1.8, label="phreatic line, p = 0")
-    time = float(run.accounts("seepage")["time_s"])
+    time = float(run.accounts("seepage")[Stage.TIME])
     for i, (condition, (_, inflow)) in enumerate(zip(stage.conditions, run.discharge, strict=True)):
         line = np.asarray(shapely.get_coordinates(run.scene.condition_line(condition)))
         colour = _CONDITIONS[i % len(_CONDITIONS)]

@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from .._errors import SimulationDiverged
 from .._types import Floats
-from ..core.simulation import FIELDS, VECTOR_FIELDS, Simulation
+from ..core.quantities import FIELDS, VECTOR_FIELDS
+from ..core.simulation import Simulation
 from ..results.plots import neighbourhood as draw
 
 FILE_NAME = "neighbourhood.csv"

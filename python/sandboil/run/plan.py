@@ -12,7 +12,10 @@ import numpy as np
 
 from .. import _core
 from .._errors import SandboilWarning
-from ..core.simulation import LOOK_INTERVAL, VECTOR_FIELDS, Simulation, doubts, loaded_motions, written_fields
+from ..core.doubts import doubts
+from ..core.motions import loaded_motions
+from ..core.quantities import VECTOR_FIELDS, written_fields
+from ..core.simulation import LOOK_INTERVAL, Simulation
 from ..ground.discretise import discretise
 from ..motion import Motion
 from ..motion._motion import SIGNIFICANT

@@ -22,8 +22,9 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from .._errors import InvalidInput, ResumeWarning, RunInterrupted, SandboilError, SimulationDiverged
 from ..core.simulation import LOOK_INTERVAL, Simulation
 from ..files.committed_file import twin_of
-from ..results.reader import FILE_NAME, Run, Writer, holds, repair
-from ..scene.stages import Gravity
+from ..results.layout import FILE_NAME
+from ..results.reader import Run
+from ..results.writer import Writer, holds, repair
 from . import checkpoint
 from . import neighbourhood as _neighbourhood
 from .accuracy import Accuracy, with_accuracy
@@ -363,23 +364,18 @@ class Bar:
     def begin(self, simulation: Simulation) -> None:
         """Open the row of the simulation's present stage."""
         duration = simulation.duration
-        self._row = self.progress.add_task(simulation.stage, total=duration, told="")
+        self._row = self.progress.add_task(simulation.stage, total=duration, state="")
 
     def update(self, simulation: Simulation) -> None:
         """Show how far the stage has come."""
         if simulation.duration is None:
-            stage = simulation.present_stage
-            told = (
-                f"unbalanced {simulation.residual:.1e} of gravity, {stage.tolerance:.0e} wanted"
-                if isinstance(stage, Gravity)
-                else f"iteration {simulation.steps}"
-            )
             # Nobody knows how far rest or the steady state is: the row fills when it is reached.
             total = 1.0 if simulation.stage_is_complete else None
-            self.progress.update(self._row, told=told, total=total, completed=1.0 if total else 0.0)
+            completed = total or 0.0
         else:
-            told = f"{simulation.time:.2f} of {simulation.duration:g} s"
-            self.progress.update(self._row, completed=min(simulation.time, simulation.duration), told=told)
+            total = simulation.duration
+            completed = min(simulation.time, total)
+        self.progress.update(self._row, total=total, completed=completed, state=simulation.progress)
 
 
 @contextmanager
@@ -391,7 +387,7 @@ def _progress_bar(wanted: bool | None) -> Iterator[Bar]:
         BarColumn(),
         TaskProgressColumn(),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[told]}"),
+        TextColumn("{task.fields[state]}"),
     )
     with Progress(
         *columns, console=console, disable=not shown, speed_estimate_period=_SPEED_WINDOW
