@@ -120,3 +120,21 @@ def test_a_folder_without_sound_columns_is_refused(kept: sb.Run, tmp_path: Path)
 def test_keeping_columns_needs_some(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="keep_columns"):
         sb.run(ground(sides=sb.Roller()), tmp_path / "out", keep_columns=True)
+
+
+def test_columns_are_read_again_before_a_run_out(tmp_path: Path) -> None:
+    """A run-out has no columns: its sides are walls."""
+    before = ground()
+    scene = before.changed(stages=[*before.stages, sb.RunOut(0.02)])
+    sb.run(scene, tmp_path / "first", threads=1, keep_columns=True)
+    with h5py.File(tmp_path / "first" / FILE_NAME) as file:
+        assert set(file) == {"shaking"}
+    again = sb.run(scene, tmp_path / "again", threads=1, columns=tmp_path / "first")
+    assert again.status == "complete"
+
+
+def test_a_run_out_alone_has_no_columns_to_keep(tmp_path: Path) -> None:
+    before = ground()
+    scene = before.changed(stages=[before.stages[0], sb.RunOut(0.02)])
+    with pytest.raises(InvalidInput, match="keep_columns"):
+        sb.run(scene, tmp_path / "out", keep_columns=True)

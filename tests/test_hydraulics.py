@@ -438,6 +438,13 @@ def test_the_physics_of_water_is_told() -> None:
     assert plain["seepage"] == (False, "no seepage stage")
     assert plain["partial saturation"] == (False, "the water table is nowhere below the ground")
     assert rows(scenes.dry_column())["seepage"] == (False, "the scene has no water")
+    # Full pores with a curve stay full unless a condition may draw water out of them.
+    curved = scenes.column(sides=Roller()).changed(
+        **{"regions[0].retention": SAND, "stages[1].conditions": [Head("base", head=2.0)]}
+    )
+    assert rows(curved)["partial saturation"] == (True, "loose")
+    closed = curved.changed(**{"stages[1].conditions": []})
+    assert rows(closed)["partial saturation"] == (False, "the water table is nowhere below the ground")
 
 
 def test_plan_tells_what_seepage_costs() -> None:

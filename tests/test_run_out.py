@@ -115,6 +115,20 @@ def test_only_ground_that_flows_pays_for_it() -> None:
     }.items()
 
 
+@pytest.mark.parametrize(
+    ("stages", "expected"),
+    [
+        ([sb.Gravity(), sb.RunOut(1.0)], (False, "soil keeps its water in a run-out")),
+        ([sb.Gravity(), sb.Shaking(duration=1.0), sb.RunOut(1.0)], (True, "slope")),
+        ([sb.Gravity()], (True, "slope")),
+    ],
+)
+def test_soil_keeps_its_water_in_a_run_out(stages: list[object], expected: tuple[bool, str]) -> None:
+    """The core computes no partial saturation there, so none is promised."""
+    (fact,) = [fact for fact in slope(*stages).active_physics() if fact.name == "partial saturation"]
+    assert (fact.on, fact.why) == expected
+
+
 def test_a_scene_that_flows_is_written_and_read() -> None:
     scene = heap(wet=True, stages=[sb.Gravity(), sb.RunOut(1.0, still_water=[(0.0, 0.3), (1.0, 0.2)])])
     assert sb.Scene.from_toml(scene.to_toml()) == scene
