@@ -40,7 +40,7 @@ import sandboil as sb
 import tomli_w
 from sandboil import _core
 from sandboil._errors import DamagedState, InvalidInput
-from sandboil.cli.lab import _strains
+from sandboil.cli.inputs import strains_of
 from sandboil.core.simulation import Simulation
 from sandboil.files import toml
 from sandboil.files.hdf5 import LAYOUT
@@ -477,7 +477,7 @@ def readers(folder: Path) -> dict[str, Callable[[], Reader]]:
         ),
         "at2": lambda: Reader([AT2, OLDER], sb.Motion.from_file, "m.AT2"),
         "csv": lambda: Reader([CSV, SEMICOLONS], sb.Motion.from_file, "m.csv"),
-        "strain-path": lambda: Reader([STRAINS], _strains, "path.csv"),
+        "strain-path": lambda: Reader([STRAINS], strains_of, "path.csv"),
         "reference": lambda: Reader([TABLE], plots._table, "histories.csv"),
         "results": results_file,
         "columns": columns_file,

@@ -30,9 +30,9 @@ from ..run.accuracy import Accuracy
 from ..run.plan import plan as plan_of
 from ..run.run import run as run_scene
 from ..scene.scene import Scene
-from ..site import CurveChoice, Place, deconvolution
 from . import lab
-from .outputs import motion_to_write
+from . import motion as motions
+from .motion import ColumnOption, UnitOption
 
 EXIT_INVALID = 2
 EXIT_STOPPED = 3
@@ -44,26 +44,18 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-motion_app = typer.Typer(help="Look at ground motions and convert them.", no_args_is_help=True)
-app.add_typer(motion_app, name="motion")
+app.add_typer(motions.app, name="motion")
 app.add_typer(lab.app, name="lab")
 
 SceneFile = Annotated[Path, typer.Argument(help="Scene as a TOML file.", metavar="SCENE")]
 MotionOption = Annotated[
     Path | None, typer.Option("--motion", help="Shake by this record (.AT2 or CSV) instead of the scene's.")
 ]
-UnitOption = Annotated[
-    str | None, typer.Option(help="Unit of a CSV's values: g, m/s2, cm/s2 or m/s, unless its header says it.")
-]
 RunKindOption = Annotated[
     Kind | None, typer.Option("--kind", help="Where the --motion is one of; default outcrop.")
 ]
-ColumnOption = Annotated[str | None, typer.Option(help="Column of a CSV, by its name.")]
 ThreadsOption = Annotated[int, typer.Option(help="Threads; the results do not depend on their number.")]
 AccuracyOption = Annotated[Accuracy, typer.Option(help="Fills the numerics that the scene leaves open.")]
-MotionFile = Annotated[Path, typer.Argument(help="Record: PEER .AT2, or CSV with a header.", metavar="FILE")]
-MotionOut = Annotated[Path, typer.Option(help="File to write, .AT2 or .csv.", callback=motion_to_write)]
-KindOption = Annotated[Kind, typer.Option(help="Where the motion is one of.")]
 
 
 def _scene(path: Path, motion: Path | None, unit: str | None, column: str | None, kind: Kind | None) -> Scene:
@@ -171,89 +163,6 @@ def plot(
     laid_over = None if reference is None else Reference.read(reference)
     for path in draw(load(folder), out, reference=laid_over, stage=stage):
         typer.echo(str(path))
-
-
-@motion_app.command()
-def info(
-    file: MotionFile, unit: UnitOption = None, column: ColumnOption = None, kind: KindOption = "outcrop"
-) -> None:
-    """Print the measures of a motion."""
-    motion = Motion.from_file(file, unit=unit, column=column, kind=kind)
-    for name, value, symbol in (
-        ("kind", motion.kind, ""),
-        ("points", len(motion.time), ""),
-        ("time step", motion.dt, " s"),
-        ("duration", motion.duration, " s"),
-        ("peak acceleration", motion.pga_g, " g"),
-        ("peak velocity", motion.pgv, " m/s"),
-        ("peak displacement", float(abs(motion.displacement).max()), " m"),
-        ("Arias intensity", motion.arias, " m/s"),
-        ("CAV", motion.cav, " m/s"),
-        ("significant duration 5-95 %", motion.d5_95, " s"),
-    ):
-        typer.echo(f"{name:<28}{value:.4g}{symbol}" if isinstance(value, float) else f"{name:<28}{value}")
-
-
-@motion_app.command()
-def spectrum(
-    file: MotionFile,
-    unit: UnitOption = None,
-    column: ColumnOption = None,
-    kind: KindOption = "outcrop",
-    damping: Annotated[float, typer.Option(help="Fraction of critical.")] = 0.05,
-) -> None:
-    """Print the pseudo-acceleration response spectrum as CSV."""
-    response = Motion.from_file(file, unit=unit, column=column, kind=kind).response_spectrum(damping)
-    typer.echo("period_s,psa_g")
-    for period, psa in zip(response.periods, response.psa_g, strict=True):
-        typer.echo(f"{period:.6g},{psa:.6g}")
-
-
-@motion_app.command()
-def convert(
-    file: MotionFile,
-    out: MotionOut,
-    unit: UnitOption = None,
-    column: ColumnOption = None,
-    pga: Annotated[float | None, typer.Option(help="Scale to this peak acceleration, g.")] = None,
-    low: Annotated[float | None, typer.Option(help="Take frequencies below this away, Hz.")] = None,
-    high: Annotated[float | None, typer.Option(help="Take frequencies above this away, Hz.")] = None,
-) -> None:
-    """Write a motion in another form, filtered and scaled if asked."""
-    motion = Motion.from_file(file, unit=unit, column=column)
-    if low is not None or high is not None:
-        motion = motion.filtered(low=low, high=high)
-    if pga is not None:
-        motion = motion.scaled(pga_g=pga)
-    _write(motion, out)
-
-
-@motion_app.command()
-def deconvolve(
-    file: MotionFile,
-    scene: Annotated[Path, typer.Option(help="Scene whose ground the record stood on.")],
-    out: MotionOut,
-    unit: UnitOption = None,
-    column: ColumnOption = None,
-    kind: KindOption = "outcrop",
-    x: Annotated[float | None, typer.Option(help="Where it stood, m; default the middle.")] = None,
-    at: Annotated[Place, typer.Option(help="At which end of the ground it stood.")] = "surface",
-    curves: Annotated[CurveChoice, typer.Option(help="Stiffness and damping over strain.")] = "darendeli",
-    linear: Annotated[bool, typer.Option("--linear", help="Keep the stiffness of small strain.")] = False,
-    max_frequency: Annotated[float | None, typer.Option(help="Take faster waves away, Hz.")] = None,
-) -> None:
-    """Find the outcrop motion at the base of a scene from a record at its surface; print strains."""
-    motion = Motion.from_file(file, unit=unit, column=column, kind=kind)
-    ground = Scene.from_toml(scene).profile(x, curves=curves)
-    found = deconvolution(motion, ground, at=at, linear=linear, max_frequency=max_frequency)
-    _write(found.motion, out)
-    typer.echo(str(found))
-
-
-def _write(motion: Motion, out: Path) -> None:
-    """Write a motion in the form that the file's ending tells."""
-    write = motion.write_at2 if out.suffix.lower() == ".at2" else motion.write_csv
-    write(out)
 
 
 def main() -> None:

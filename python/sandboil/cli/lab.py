@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import Progress
 
 from .. import lab
 from .._errors import InvalidInput, SandboilError
-from .._style import DPI
-from .._types import Floats
 from ..files import toml as _toml
-from ..files.input_file import read_text
 from ..lab._arguments import Integrator
-from ..scene.soils import Material, PM4Sand, material
-from .outputs import picture_to_write, to_write
+from .inputs import soil_of, strains_of
+from .outputs import csv_of, draw, picture_to_write, to_write, write_csv, write_text
+from .pages import cyclic_lines, monotonic_lines, resistance_lines
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 app = typer.Typer(help="Test a soil at one point, or as a block of particles.", no_args_is_help=True)
 
@@ -45,24 +39,6 @@ StopOption = Annotated[float, typer.Option(help="Shear strain that ends a cyclic
 MaxCyclesOption = Annotated[int, typer.Option(help="Cycles that end a cyclic test.")]
 CyclesOption = Annotated[float, typer.Option(help="Uniform cycles, counted by halves.")]
 OutOption = Annotated[Path | None, typer.Option(help="CSV for the record.", callback=to_write)]
-
-# Levels that the summary of a cyclic test counts cycles to.
-_LEVELS = (
-    *(("r_u", level) for level in (0.90, 0.95, 0.98)),
-    *((measure, level) for measure in ("gamma_sa", "gamma_da") for level in (0.01, 0.03, 0.05)),
-)
-# Shear strains at which the summary of a monotonic test reads stresses.
-_STRAINS = (0.001, 0.005, 0.01, 0.02, 0.05, 0.1)
-
-
-def soil_of(file: Path | None, **sand: float | None) -> Material:
-    """The soil of a TOML file, or PM4Sand by its three parameters."""
-    given = {name: value for name, value in sand.items() if value is not None}
-    if file is None:
-        return PM4Sand(**given)
-    if given:
-        raise InvalidInput("--soil", str(file), f"excludes --{', --'.join(given)}", "put them into the file")
-    return material(_toml.parse(_toml.read(file, "--soil"), "--soil", str(file)))
 
 
 @app.command()
@@ -105,10 +81,10 @@ def dss(
     test: lab.ShearTest
     if csr is None:
         test = lab.monotonic_dss(tested, gamma_max=gamma_max, **common)
-        lines = _monotonic_lines(test)
+        lines = monotonic_lines(test)
     else:
         test = lab.cyclic_dss(tested, csr=csr, gamma_stop=gamma_stop, max_cycles=max_cycles, **common)
-        lines = _cyclic_lines(test)
+        lines = cyclic_lines(test)
     _conclude(test, lines, out, plot)
 
 
@@ -132,8 +108,6 @@ def cell(
     plot: PlotOption = None,
 ) -> None:
     """Cyclic simple shear of a block of particles with a free centre, in minutes; prints as dss does."""
-    # It loads slowly, and no other test of the laboratory is long enough for it.
-
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
         row = bar.add_task("cycles", total=max_cycles)
@@ -156,42 +130,16 @@ def cell(
             threads=threads,
         )
     spread = f"{100.0 * test.report.gamma_spread:.2g} % strain, {test.report.tau_spread:.2g} kPa"
-    _conclude(test, [*_cyclic_lines(test), f"{'largest spread':<28}{spread}"], out, plot)
+    _conclude(test, [*cyclic_lines(test), f"{'largest spread':<28}{spread}"], out, plot)
 
 
 def _conclude(test: lab.ShearTest, lines: list[str], out: Path | None, plot: Path | None) -> None:
     typer.echo("\n".join([*lines, f"{'ended':<28}{test.ended}"]))
     if out is not None:
-        _write(out, test.columns())
+        write_csv(out, test.columns())
     if plot is not None:
-        _draw(plot, test.plot())
+        draw(plot, test.plot())
     _stop_if_incomplete(test)
-
-
-def _cyclic_lines(test: lab.CyclicTest) -> list[str]:
-    names = {"r_u": "r_u", "gamma_sa": "single amplitude", "gamma_da": "double amplitude"}
-    lines = [f"{'criterion':<28}{'cycles':>8}"]
-    for measure, level in _LEVELS:
-        cycles = test.cycles_to(**{measure: level})
-        shown = f"{level:.2f}" if measure == "r_u" else f"{100.0 * level:g} %"
-        lines.append(f"{names[measure] + ' ' + shown:<28}{cycles:>8.2f}".replace("     nan", "   never"))
-    lines.append(f"{'cycles made':<28}{test.cycle[-1]:>8.2f}")
-    lines.append(f"{'largest r_u':<28}{test.r_u.max():>8.3f}")
-    lines.append(f"{'largest shear strain, %':<28}{100.0 * test.gamma_sa.max():>8.2f}")
-    return lines
-
-
-def _monotonic_lines(test: lab.ShearTest) -> list[str]:
-    lines = [f"{'shear strain, %':<18}{'shear stress, kPa':>20}{'vertical, kPa':>16}{'contraction, %':>16}"]
-    # The last increment leaves round-off.
-    reached = [strain for strain in _STRAINS if strain <= round(float(test.gamma[-1]), 9)]
-    for strain in reached:
-        tau, sigma, volume = (
-            np.interp(strain, test.gamma, column) for column in (test.tau, test.sigma_v_eff, test.eps_v)
-        )
-        lines.append(f"{100.0 * strain:<18g}{tau:>20.2f}{sigma:>16.2f}{100.0 * volume:>16.3f}")
-    lines.append(f"{'largest':<18}{test.tau.max():>20.2f}")
-    return lines
 
 
 @app.command("strain-path")
@@ -215,14 +163,14 @@ def strain_path(
     test = lab.strain_path(
         soil_of(soil, Dr=Dr, G0=G0, hpo=hpo),
         stress0=stress0,
-        strain=_strains(file),
+        strain=strains_of(file),
         void_ratio=void_ratio,
         integrator=integrator,
     )
     if out is None:
-        typer.echo(_csv(test.columns()), nl=False)
+        typer.echo(csv_of(test.columns()), nl=False)
     else:
-        _write(out, test.columns())
+        write_csv(out, test.columns())
     _stop_if_incomplete(test)
 
 
@@ -279,9 +227,9 @@ def calibrate(
         f"# CRR {result.achieved:.4g} in {cycles:g} cycles, {result.target:.4g} asked for\n{text}", nl=False
     )
     if out is not None:
-        _write_text(out, text)
+        write_text(out, text)
     if plot is not None:
-        _draw(plot, result.plot())
+        draw(plot, result.plot())
 
 
 @app.command()
@@ -311,59 +259,11 @@ def crr(
         void_ratio=void_ratio,
         integrator=integrator,
     )
-    typer.echo(f"{'CSR':>8}" + "".join(f"{name:>24}" for name in curve.cycles))
-    for row, ratio in enumerate(curve.csr):
-        cells = (f"{cycles[row]:>24.2f}".replace("  nan", "never") for cycles in curve.cycles.values())
-        typer.echo(f"{ratio:>8.4f}" + "".join(cells))
+    typer.echo("\n".join(resistance_lines(curve)))
     if out is not None:
-        _write(out, curve.columns())
+        write_csv(out, curve.columns())
     if plot is not None:
-        _draw(plot, curve.plot())
-
-
-def _strains(path: Path) -> Floats:
-    names = ("eps_xx", "eps_yy", "gamma_xy")
-    text = read_text(path, "PATH", "CSV file")
-    try:
-        rows = list(csv.DictReader(io.StringIO(text, newline="")))
-        return np.array([[float(row[name]) for name in names] for row in rows])
-    except KeyError as error:
-        told, found = f"must have a column {error.args[0]}", text.partition("\n")[0]
-        raise InvalidInput("PATH", str(path), told, f"its header is {found!r}") from error
-    except (csv.Error, ValueError, TypeError) as error:
-        raise InvalidInput(
-            "PATH",
-            str(path),
-            f"must be a CSV of numbers below a header: {error}",
-            f"columns {', '.join(names)}",
-        ) from error
-
-
-def _csv(columns: dict[str, NDArray[Any]]) -> str:
-    # Adding 0 takes the sign of a zero away.
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    lines = [",".join(columns), *(",".join(f"{value + 0.0:.9g}" for value in row) for row in rows)]
-    return "\n".join(lines) + "\n"
-
-
-def _write(path: Path, columns: dict[str, NDArray[Any]]) -> None:
-    _write_text(path, _csv(columns))
-
-
-def _draw(path: Path, figure: Figure) -> None:
-    try:
-        figure.savefig(path, dpi=DPI)
-    except (OSError, ValueError) as error:
-        raise InvalidInput("--plot", str(path), f"must be writable: {error}", "name another file") from error
-
-
-def _write_text(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InvalidInput(
-            "--out", str(path), f"must be writable: {error.strerror}", "name another file"
-        ) from error
+        draw(plot, curve.plot())
 
 
 def _stop_if_incomplete(test: lab.ShearTest | lab.PathTest) -> None:

@@ -1,13 +1,19 @@
-"""Files that commands are to write: found unwritable before any work is done for them."""
+"""Files that commands write: refused before any work if they cannot be written."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import typer
+from numpy.typing import NDArray
 
 from .._errors import InvalidInput
+from .._style import DPI
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Forms of a motion's file, and of a picture, known by their endings.
 MOTIONS = (".at2", ".csv")
@@ -56,3 +62,34 @@ def _obstacle(path: Path) -> str | None:
         return f"there is no folder {folder}"
     target = path if path.exists() else folder
     return None if os.access(target, os.W_OK) else f"{target} is not"
+
+
+def csv_of(columns: dict[str, NDArray[Any]]) -> str:
+    """Columns of numbers as CSV."""
+    # Adding 0 takes the sign of a zero away.
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(f"{value + 0.0:.9g}" for value in row) for row in rows)]
+    return "\n".join(lines) + "\n"
+
+
+def write_csv(path: Path, columns: dict[str, NDArray[Any]]) -> None:
+    """Write columns of numbers as CSV."""
+    write_text(path, csv_of(columns))
+
+
+def draw(path: Path, figure: Figure) -> None:
+    """Write a picture."""
+    try:
+        figure.savefig(path, dpi=DPI)
+    except (OSError, ValueError) as error:
+        raise InvalidInput("--plot", str(path), f"must be writable: {error}", "name another file") from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text."""
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InvalidInput(
+            "--out", str(path), f"must be writable: {error.strerror}", "name another file"
+        ) from error
