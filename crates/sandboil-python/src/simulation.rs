@@ -171,12 +171,51 @@ fn base(stage: &Bound<'_, PyDict>) -> PyResult<solver::Base> {
     })
 }
 
-fn run_out(dict: &Bound<'_, PyDict>) -> PyResult<solver::RunOut> {
+fn output(stage: &Bound<'_, PyDict>) -> PyResult<solver::Output> {
+    Ok(solver::Output {
+        probes: vectors(&get(stage, "probes")?),
+        history_interval: get(stage, "history_interval")?,
+        stress_histories: get(stage, "stress_histories")?,
+        pressure_envelope: get(stage, "pressure_envelope")?,
+        strain_envelope: get(stage, "strain_envelope")?,
+        record_columns: get(stage, "record_columns")?,
+    })
+}
+
+fn time_step_factor(stage: &Bound<'_, PyDict>) -> PyResult<f64> {
+    Ok(get::<Option<f64>>(stage, "time_step_factor")?.unwrap_or(solver::MOVING_FACTOR))
+}
+
+fn run_out(stage: &Bound<'_, PyDict>, dict: &Bound<'_, PyDict>) -> PyResult<solver::RunOut> {
     let line: Option<PyReadonlyArray2<f64>> = get(dict, "still_water")?;
     Ok(solver::RunOut {
+        duration: get(stage, "duration")?,
         viscosity: get(dict, "viscosity")?,
         open: get(dict, "open")?,
         still_water: line.as_ref().map(vectors),
+        local_damping: get(stage, "local_damping")?,
+        time_step_factor: time_step_factor(stage)?,
+        output: output(stage)?,
+    })
+}
+
+fn shaking(stage: &Bound<'_, PyDict>) -> PyResult<solver::Shaking> {
+    let [left, right] = get::<[String; 2]>(stage, "sides")?;
+    let is_free = |side: &str| one_of("sides", side, &[("free-field", true), ("wall", false)]);
+    let rayleigh: Option<(f64, [f64; 2])> = get(stage, "rayleigh")?;
+    Ok(solver::Shaking {
+        duration: get(stage, "duration")?,
+        base: base(stage)?,
+        free_field: [is_free(&left)?, is_free(&right)?],
+        column_records: column_records(stage)?,
+        local_damping: get(stage, "local_damping")?,
+        rayleigh: rayleigh.map(|(ratio, frequencies)| solver::Rayleigh { ratio, frequencies }),
+        time_step_factor: time_step_factor(stage)?,
+        conditions: get::<Vec<Bound<'_, PyDict>>>(stage, "conditions")?
+            .iter()
+            .map(moving_boundary)
+            .collect::<PyResult<_>>()?,
+        output: output(stage)?,
     })
 }
 
@@ -311,36 +350,15 @@ impl Simulation {
 
     #[pyo3(signature = (*, tolerance, max_steps))]
     fn begin_gravity(&mut self, tolerance: f64, max_steps: u64) -> PyResult<()> {
-        Ok(self.inner.begin_gravity(solver::Gravity { tolerance, max_steps }).map_err(CoreError)?)
+        Ok(self.inner.begin(solver::Gravity { tolerance, max_steps }).map_err(CoreError)?)
     }
 
     fn begin_shaking(&mut self, stage: &Bound<'_, PyDict>) -> PyResult<()> {
-        let [left, right] = get::<[String; 2]>(stage, "sides")?;
-        let is_free = |side: &str| one_of("sides", side, &[("free-field", true), ("wall", false)]);
-        let rayleigh: Option<(f64, [f64; 2])> = get(stage, "rayleigh")?;
-        let flowing: Option<Bound<'_, PyDict>> = get(stage, "run_out")?;
-        let stage = solver::Shaking {
-            run_out: flowing.as_ref().map(run_out).transpose()?,
-            duration: get(stage, "duration")?,
-            base: base(stage)?,
-            free_field: [is_free(&left)?, is_free(&right)?],
-            column_records: column_records(stage)?,
-            record_columns: get(stage, "record_columns")?,
-            local_damping: get(stage, "local_damping")?,
-            rayleigh: rayleigh.map(|(ratio, frequencies)| solver::Rayleigh { ratio, frequencies }),
-            time_step_factor: get::<Option<f64>>(stage, "time_step_factor")?
-                .unwrap_or(solver::SHAKING_FACTOR),
-            probes: vectors(&get(stage, "probes")?),
-            history_interval: get(stage, "history_interval")?,
-            conditions: get::<Vec<Bound<'_, PyDict>>>(stage, "conditions")?
-                .iter()
-                .map(moving_boundary)
-                .collect::<PyResult<_>>()?,
-            stress_histories: get(stage, "stress_histories")?,
-            pressure_envelope: get(stage, "pressure_envelope")?,
-            strain_envelope: get(stage, "strain_envelope")?,
+        let begun = match get::<Option<Bound<'_, PyDict>>>(stage, "run_out")? {
+            Some(dict) => self.inner.begin(run_out(stage, &dict)?),
+            None => self.inner.begin(shaking(stage)?),
         };
-        Ok(self.inner.begin_shaking(stage).map_err(CoreError)?)
+        Ok(begun.map_err(CoreError)?)
     }
 
     /// Steps until `until` (s), `steps` are made or `seconds` have passed; returns whether the stage is over.

@@ -51,11 +51,11 @@ fn model(ground: Ground, columns: usize) -> Model {
 /// A simulation under way, shaken by 0.2 m/s at 2 Hz.
 fn under_way(ground: Ground, columns: usize, threads: usize) -> Simulation {
     let mut simulation = Simulation::new(&model(ground, columns), threads).unwrap();
-    simulation.begin_gravity(Gravity { tolerance: 1e-4, max_steps: 20_000 }).unwrap();
+    simulation.begin(Gravity { tolerance: 1e-4, max_steps: 20_000 }).unwrap();
     simulation.advance(RELAXATION, f64::INFINITY).unwrap();
     let velocity = (0..20_000).map(|k| 0.1 * (4e-3 * std::f64::consts::PI * f64::from(k)).sin()).collect();
     let stage = shaking(Some(UpgoingWave::shear(1e-3, velocity)), 1e3, Vec::new());
-    simulation.begin_shaking(stage).unwrap();
+    simulation.begin(stage).unwrap();
     simulation.advance(LEAD, f64::INFINITY).unwrap();
     simulation
 }
@@ -84,7 +84,7 @@ fn free_field_beside_walls() {
             let mut both = [false, true].map(|free| {
                 let mut simulation = Simulation::new(&section, threads).unwrap();
                 let stage = Shaking { free_field: [free; 2], ..shaking(None, 1e3, Vec::new()) };
-                simulation.begin_shaking(stage).unwrap();
+                simulation.begin(stage).unwrap();
                 simulation
             });
             // The least of several rounds in turn: what else the machine does only adds.

@@ -7,9 +7,11 @@
 mod edges;
 mod error;
 mod linear;
+mod neighbours;
 mod parallel;
 mod run;
 mod section;
+mod shear_cell;
 mod skeleton;
 mod stages;
 #[cfg(test)]
@@ -20,12 +22,9 @@ mod weights;
 pub use edges::base::{Base, BaseSegment, HalfSpace, Impedance, UpgoingWave, Vertical};
 pub use error::{SolverError, StateError};
 pub use run::{
-    checkpoint,
-    energy::ENERGY_NAMES,
-    simulation::{ACCELERATION_TERM_CONDUCTIVITY, Counters, Gravity, SHAKING_FACTOR, Shaking, Simulation},
+    begin::ACCELERATION_TERM_CONDUCTIVITY, checkpoint, clock::Counters, observers::energy::ENERGY_NAMES,
     time_step::Criterion,
 };
-
 pub use sandboil_sph::{Period, Vec2};
 pub use section::{
     description::{
@@ -34,16 +33,21 @@ pub use section::{
     },
     outline::{Outline, Side, Support},
 };
-
+pub use shear_cell::{CellTest, Departure, ShearCell};
 pub use skeleton::rayleigh::Rayleigh;
 pub use stages::{
-    column::ColumnRecord,
+    column_record::ColumnRecord,
+    gravity::Gravity,
+    rules::{Choices, RULES, Rule, broken},
     run_out::RunOut,
-    seepage::{Seepage, SeepageCounters, Until, WaterBalance},
-    shear_cell::{CellTest, Departure, ShearCell},
+    shaking::{MOVING_FACTOR, Shaking},
+    stage::{BaseEdge, Damping, Displacements, Edges, End, Output, SideEdge, Stage, Surface, WaterReference},
 };
-
 pub use water::{
     conditions::{HydraulicBoundary, HydraulicCondition, Series},
     moving_edges::MovingBoundary,
+    seepage::{Seepage, SeepageCounters, Until, WaterBalance},
 };
+
+/// A section under one stage after the other, beside free-field columns where it asks for them.
+pub type Simulation = run::simulation::Driver<neighbours::free_field::FreeField>;

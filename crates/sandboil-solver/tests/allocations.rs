@@ -13,8 +13,8 @@ use sandboil_soil::{
     pm4sand::{Options, PM4Sand, Parameters},
 };
 use sandboil_solver::{
-    Conductivity, Diffusion, Gravity, HydraulicBoundary, HydraulicCondition, Model, MovingBoundary, Rayleigh,
-    Series, Shaking, Simulation, UpgoingWave, Vec2, Water,
+    Conductivity, Diffusion, Gravity, HydraulicBoundary, HydraulicCondition, Model, MovingBoundary, Output,
+    Rayleigh, Series, Shaking, Simulation, UpgoingWave, Vec2, Water,
 };
 
 const WATER: Water = Water { unit_weight: 10.0, bulk_modulus: 1e6 };
@@ -39,15 +39,16 @@ fn stage() -> Shaking {
     let velocity = (0..2000).map(|k| 0.05 * (0.02 * f64::from(k)).sin()).collect();
     let stage = shaking(Some(UpgoingWave::shear(1e-3, velocity)), 10.0, vec![Vec2::new(0.3, 5.0)]);
     // Finished samples wait to be taken: none is finished while steps are counted.
-    Shaking { history_interval: 1.0, ..stage }
+    let output = Output { history_interval: 1.0, ..stage.output };
+    Shaking { output, ..stage }
 }
 
 fn allocations(model: &Model, stage: Shaking) -> u64 {
     let mut simulation = Simulation::new(model, 1).unwrap();
-    simulation.begin_gravity(Gravity { tolerance: 1e-4, max_steps: 20_000 }).unwrap();
+    simulation.begin(Gravity { tolerance: 1e-4, max_steps: 20_000 }).unwrap();
     simulation.advance(LEAD, f64::INFINITY).unwrap();
     let in_gravity = measure(|| drop(simulation.advance(COUNTED, f64::INFINITY))).count_total;
-    simulation.begin_shaking(stage).unwrap();
+    simulation.begin(stage).unwrap();
     simulation.advance(LEAD, f64::INFINITY).unwrap();
     let shaken = measure(|| drop(simulation.advance(COUNTED, f64::INFINITY))).count_total;
     assert!(simulation.step() == LEAD + COUNTED);
@@ -87,9 +88,12 @@ fn steps_take_no_memory() {
             "all histories",
             sand(Diffusion::Implicit),
             Shaking {
-                stress_histories: true,
-                pressure_envelope: true,
-                strain_envelope: true,
+                output: Output {
+                    stress_histories: true,
+                    pressure_envelope: true,
+                    strain_envelope: true,
+                    ..stage().output
+                },
                 local_damping: 0.05,
                 ..stage()
             },

@@ -91,6 +91,9 @@ STRESS_HISTORIES = (
 )
 
 
+# Names whose sum is the work of all constant forces.
+CONSTANT_FORCES = ("weight", "still_water", "reaction", "renewal_force", "load")
+
 # What is kept of energy and mass in a stage of shaking, in the core's order. Works count from its beginning.
 ENERGY: dict[str, Quantity] = {
     "kinetic": Quantity("kJ/m", "kinetic energy"),
@@ -98,7 +101,11 @@ ENERGY: dict[str, Quantity] = {
     "water": Quantity("kJ/m", "given to the pore water beyond its state at rest"),
     "damping": Quantity("kJ/m", "taken by the velocity filter and Rayleigh damping"),
     "local_damping": Quantity("kJ/m", "taken by local damping"),
-    "constant_forces": Quantity("kJ/m", "done by gravity and the reactions stored at rest"),
+    "weight": Quantity("kJ/m", "work of the weight"),
+    "still_water": Quantity("kJ/m", "work of the pore pressure at rest"),
+    "reaction": Quantity("kJ/m", "work of the forces that balance the state at the start of the stage"),
+    "renewal_force": Quantity("kJ/m", "work of the forces that balance renewed weights"),
+    "load": Quantity("kJ/m", "work of loads"),
     "base": Quantity("kJ/m", "brought in through the base, less what leaves there"),
     "sides": Quantity("kJ/m", "brought in through free-field sides, less what leaves there"),
     "renewal": Quantity("kJ/m", "kinetic energy gained where a renewed geometry changes masses"),

@@ -19,6 +19,7 @@ import shapely
 from .._errors import InvalidInput
 from .._style import DPI, INPUT, OURS, REFERENCE, new_figure, styled
 from .._types import Floats
+from ..core.quantities import CONSTANT_FORCES
 from ..files.input_file import read_text
 from ..motion import Motion
 from ..motion._motion import SIGNIFICANT
@@ -406,7 +407,7 @@ def energy(run: Run, *, stage: str | None = None) -> Figure:
     parts = {
         "came in": history["base"] + history["sides"],
         "motion": history["kinetic"],
-        "soil": history["stress"] - history["constant_forces"],
+        "soil": history["stress"] - sum(history[name] for name in CONSTANT_FORCES),
         "pore water": history["water"],
         taken: history["damping"],
         "local damping": history["local_damping"],

@@ -224,7 +224,8 @@ class Run:
         ::
 
             kinetic + stress + water + damping + local_damping
-                = kinetic at the beginning + constant_forces + base + sides + renewal
+                = kinetic at the beginning + weight + still_water + reaction + renewal_force + load
+                + base + sides + renewal
 
         `sandboil.core.quantities.ENERGY` describes each. `damping` is what the forces of the skeleton take
         beyond the work of its stress: without velocity filter and Rayleigh damping it is the error of the

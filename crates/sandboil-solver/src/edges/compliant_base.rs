@@ -3,7 +3,7 @@
 use crate::{
     edges::{
         base::{Base, Impedance, UpgoingWave, Vertical},
-        dashpots::{Dashpot, Dashpots, trace},
+        dashpots::{Dashpot, Dashpots, NodalMotion, trace},
     },
     section::{description::Model, edge_nodes::EdgeNodes},
 };
@@ -37,7 +37,8 @@ impl CompliantBase {
     /// A dashpot below each of the lowest nodes, on half-spaces of the given impedances.
     pub fn new(
         model: &Model,
-        (edges, position): (&EdgeNodes, &[Vec2]),
+        edges: &EdgeNodes,
+        position: &[Vec2],
         mass: &[f64],
         impedance: Vec<Impedance>,
         base: &Base,
@@ -98,7 +99,7 @@ impl CompliantBase {
     }
 
     /// See [`Dashpots::end_step`].
-    pub fn end_step(&mut self, time: f64, dt: f64, mass: &[f64], motion: (&mut [Vec2], &mut [Vec2])) {
+    pub fn end_step(&mut self, time: f64, dt: f64, mass: &[f64], motion: &mut NodalMotion) {
         let (incoming, waves) = (&self.incoming, &self.waves);
         self.dashpots.end_step(dt, mass, motion, |k| {
             incoming[k].map_or(0.0, |incoming| {

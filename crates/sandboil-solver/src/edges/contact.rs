@@ -1,6 +1,7 @@
 //! Contact of single nodes with edges. A node without neighbours has no strain, and so no stress that would stop it at an
 //! edge: it sticks there.
 
+use crate::edges::dashpots::NodalMotion;
 use crate::section::{
     description::Model,
     outline::{Hand, Outline},
@@ -11,10 +12,10 @@ use sandboil_sph::Vec2;
 pub const LEAST_DISTANCE: f64 = 0.2;
 /// Stops nodes that would come too near an edge in the step. Returns how many.
 pub fn stick_to_edges(
-    (model, outline): (&Model, &Outline),
+    model: &Model,
+    outline: &Outline,
     position: &[Vec2],
-    velocity: &mut [Vec2],
-    acceleration: &mut [Vec2],
+    NodalMotion { velocity, acceleration }: NodalMotion,
     dt: f64,
 ) -> u64 {
     let least = LEAST_DISTANCE * model.mean_spacing();
@@ -58,7 +59,13 @@ mod tests {
             Some(crate::Side { x: 5.0, extent: [0.0, 3.0], support: crate::Support::FreeSlip });
         let stopped = |at: Vec2, velocity: Vec2| {
             let (mut v, mut a) = ([velocity], [Vec2::zeros()]);
-            let count = stick_to_edges((&model, &model.outline), &[at], &mut v, &mut a, 0.1);
+            let count = stick_to_edges(
+                &model,
+                &model.outline,
+                &[at],
+                NodalMotion { velocity: &mut v, acceleration: &mut a },
+                0.1,
+            );
             assert_eq!(count == 1, v[0] == Vec2::zeros());
             assert!((a[0] * 0.1 + velocity - v[0]).norm() < 1e-15);
             count == 1

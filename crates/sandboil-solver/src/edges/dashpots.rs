@@ -19,6 +19,23 @@ pub fn relaxation(z: f64) -> (f64, f64) {
     (relaxed, (1.0 - relaxed) / z)
 }
 
+/// Velocities and accelerations of a section's nodes, followed by the copies of a neighbour's. Forces change both alike.
+pub struct NodalMotion<'a> {
+    /// Velocities, m/s.
+    pub velocity: &'a mut [Vec2],
+    /// Accelerations, m/s2.
+    pub acceleration: &'a mut [Vec2],
+}
+
+impl NodalMotion<'_> {
+    /// Adds an acceleration (m/s2) to node `j` over `dt`, s.
+    #[inline]
+    pub fn add(&mut self, j: usize, acceleration: Vec2, dt: f64) {
+        self.velocity[j] += acceleration * dt;
+        self.acceleration[j] += acceleration;
+    }
+}
+
 /// A dashpot at a point of an edge, in one direction.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Dashpot {
@@ -126,12 +143,12 @@ impl Dashpots {
         &mut self,
         dt: f64,
         mass: &[f64],
-        (velocity, acceleration): (&mut [Vec2], &mut [Vec2]),
+        motion: &mut NodalMotion,
         target: impl Fn(usize) -> f64,
     ) {
         // All points read the velocities before any is changed.
         for (k, dashpot) in self.all.iter().enumerate() {
-            let (before, moved) = (self.before[k], self.felt(dashpot, velocity));
+            let (before, moved) = (self.before[k], self.felt(dashpot, motion.velocity));
             let (relaxed, pushed) = relaxation(self.rate[k] * dt);
             self.traction[k] =
                 dashpot.impedance * (relaxed * (target(k) - before) - pushed * (moved - before));
@@ -139,14 +156,10 @@ impl Dashpots {
         for (k, (dashpot, traction)) in self.all.iter().zip(&self.traction).enumerate() {
             let force = dashpot.direction * (traction * dashpot.length);
             for (node, weight) in self.trace.iter_row(dashpot.point) {
-                let pushed = force * (weight / mass[node]);
-                velocity[node] += pushed * dt;
-                acceleration[node] += pushed;
+                motion.add(node, force * (weight / mass[node]), dt);
             }
             for (node, response) in self.spread.iter().flat_map(|spread| spread.iter_row(k)) {
-                let pushed = response * (traction * dashpot.length);
-                velocity[node] += pushed * dt;
-                acceleration[node] += pushed;
+                motion.add(node, response * (traction * dashpot.length), dt);
             }
         }
     }

@@ -25,7 +25,7 @@ pub const FREE_UNDRAINED_COEFFICIENT: f64 = 0.9;
 pub const VISCOSITY_RATIO: f64 = 0.5;
 /// Share of the lattice's drainage that is left to a few nodes of flowing ground which touch each other alone: through the
 /// surface, `2/dx^2` of up to `8/dx^2`.
-pub const FLOWING_DRAINAGE: f64 = 0.25;
+pub const FREE_SURFACE_DRAINAGE: f64 = 0.25;
 /// Explicit diffusion: `dt <= 0.65 dx^2 C / k`.
 pub const DIFFUSION_COEFFICIENT: f64 = 0.65;
 /// Largest eigenvalue of the velocity filter over `xi C_s / dx`.
@@ -65,6 +65,23 @@ impl Criterion {
             Self::Diffusion => "explicit pore-pressure diffusion",
             Self::Damping => "Rayleigh damping of the shortest waves",
         }
+    }
+}
+
+/// A limit of the time step.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct TimeLimit {
+    /// Longest stable time step, s.
+    pub dt: f64,
+    /// What sets it.
+    pub criterion: Criterion,
+}
+
+impl TimeLimit {
+    /// The shorter of two, the first of equal ones.
+    #[must_use]
+    pub fn least(self, other: Self) -> Self {
+        if other.dt < self.dt { other } else { self }
     }
 }
 
@@ -145,34 +162,41 @@ pub fn left_by_damping(ratio: f64) -> f64 {
     (1.0 + ratio * ratio).sqrt() - ratio
 }
 
+/// What the limit of the time step depends on beside the soil.
+#[derive(Clone, Copy)]
+pub struct Limits<'a> {
+    /// How pore pressure takes part.
+    pub coupling: PressureCoupling,
+    /// Spectrum of the pressure operators, read with implicit diffusion only.
+    pub spectrum: &'a PressureSpectrum,
+    /// Rayleigh damping, which acts on the skeleton alone: its rate is that of the skeleton's fastest wave, whatever the
+    /// water adds to the frequency.
+    pub rayleigh: Option<&'a Rayleigh>,
+    /// Whether inertia is corrected for dispersion.
+    pub is_corrected: bool,
+    /// Coefficient of the artificial viscosity, 1.
+    pub viscosity: f64,
+    /// Whether the pressure of nodes below the surface is tied to it; else no pressure is prescribed within a step.
+    pub surface_is_tied: bool,
+}
+
 /// Limit for one region at a skeleton stiffness `K + 4G/3` in kPa, s.
-///
-/// `spectrum` belongs to implicit diffusion and is read only there. Rayleigh damping acts on the skeleton alone: its
-/// rate is that of the skeleton's fastest wave, whatever the water adds to the frequency. `corrected` says whether inertia
-/// is corrected for dispersion. No surface of ground that flows, braked
-/// by an artificial `viscosity`, is tied to a pressure.
-pub fn region_limit(
-    (model, region): (&Model, usize),
-    skeleton_stiffness: f64,
-    coupling: PressureCoupling,
-    spectrum: &PressureSpectrum,
-    rayleigh: Option<&Rayleigh>,
-    (corrected, viscosity): (bool, Option<f64>),
-) -> (f64, Criterion) {
+pub fn region_limit(model: &Model, region: usize, skeleton_stiffness: f64, limits: &Limits) -> TimeLimit {
+    let Limits { coupling, spectrum, rayleigh, is_corrected, viscosity, surface_is_tied } = *limits;
     let h = model.smoothing_length();
-    let (response, filtered) = if corrected { (CORRECTED_RESPONSE, CORRECTED_FILTER) } else { (1.0, 1.0) };
+    let (response, filtered) = if is_corrected { (CORRECTED_RESPONSE, CORRECTED_FILTER) } else { (1.0, 1.0) };
     let density = model.mixture_density(region) / response;
     let undamped = |coefficient: f64, stiffness: f64| coefficient * h / (stiffness / density).sqrt();
     let longest = undamped(DRAINED_COEFFICIENT, skeleton_stiffness);
     let rate = rayleigh.map_or(0.0, |damping| damping.rate(2.0 / longest));
-    let braked = VISCOSITY_RATIO * viscosity.unwrap_or(0.0);
+    let braked = VISCOSITY_RATIO * viscosity;
     let filter = filter_ratio(model) * filtered / response.sqrt() + braked;
     let viscous = |limit: f64| 0.25 * rate * limit;
     let wave = |coefficient: f64, stiffness: f64, criterion: Criterion| {
         let limit = undamped(coefficient, stiffness);
         let ratio = viscous(limit);
         let named = if ratio > VISCOUS_RATIO { Criterion::Damping } else { criterion };
-        (limit * left_by_damping(filter + ratio), named)
+        TimeLimit { dt: limit * left_by_damping(filter + ratio), criterion: named }
     };
     let drained = wave(DRAINED_COEFFICIENT, skeleton_stiffness, Criterion::DrainedWave);
     if coupling == PressureCoupling::None {
@@ -180,33 +204,31 @@ pub fn region_limit(
     }
     let water = model.water_stiffness(model.regions[region].porosity);
     let diffusivity = model.pressure_diffusivity(region, |k| k.major);
-    let coefficient = if diffusivity > 0.0 && viscosity.is_none() {
-        UNDRAINED_COEFFICIENT
-    } else {
-        FREE_UNDRAINED_COEFFICIENT
-    };
+    let coefficient =
+        if diffusivity > 0.0 && surface_is_tied { UNDRAINED_COEFFICIENT } else { FREE_UNDRAINED_COEFFICIENT };
     let undrained = wave(coefficient, skeleton_stiffness + water, Criterion::UndrainedWave);
-    let combined = if undrained.0 < drained.0 { undrained } else { drained };
+    let combined = drained.least(undrained);
     if diffusivity == 0.0 {
         return combined;
     }
     if coupling == PressureCoupling::Explicit {
         let area = model.spacing.x.min(model.spacing.y).powi(2);
         let diffusion = DIFFUSION_COEFFICIENT * area / diffusivity;
-        let both = (combined.0.powi(-2) + diffusion.powi(-2)).powf(-0.5);
-        return (both, if diffusion < combined.0 { Criterion::Diffusion } else { combined.1 });
+        let dt = (combined.dt.powi(-2) + diffusion.powi(-2)).powf(-0.5);
+        let criterion = if diffusion < combined.dt { Criterion::Diffusion } else { combined.criterion };
+        return TimeLimit { dt, criterion };
     }
     let left = left_by_damping(filter + viscous(longest));
     // Across the grain the water drains last.
-    let left_open = if viscosity.is_some() { FLOWING_DRAINAGE } else { 1.0 };
+    let left_open = if surface_is_tied { 1.0 } else { FREE_SURFACE_DRAINAGE };
     let diffusivity = left_open * model.pressure_diffusivity(region, |k| k.minor);
     // Water that drains at grid scale within a step stiffens the short waves no more.
     let at_edge = (UNDRAINED_COEFFICIENT / coefficient).powi(2);
     let stable = |dt: f64| {
         let share = spectrum.share(at_edge * water / density, diffusivity, dt / left);
-        (dt / drained.0).powi(2) + share <= 1.0
+        (dt / drained.dt).powi(2) + share <= 1.0
     };
-    let (mut low, mut high) = (combined.0.min(drained.0), drained.0);
+    let (mut low, mut high) = (combined.dt.min(drained.dt), drained.dt);
     if !stable(low) {
         return combined;
     }
@@ -214,5 +236,6 @@ pub fn region_limit(
         let middle = 0.5 * (low + high);
         if stable(middle) { low = middle } else { high = middle }
     }
-    (low, if low > 0.99 * drained.0 { drained.1 } else { Criterion::DrainingWave })
+    let criterion = if low > 0.99 * drained.dt { drained.criterion } else { Criterion::DrainingWave };
+    TimeLimit { dt: low, criterion }
 }

@@ -18,7 +18,8 @@ pub enum Support {
 }
 
 impl Support {
-    fn condition(self) -> Condition {
+    /// What it does to the ground at the edge.
+    pub fn condition(self) -> Condition {
         match self {
             Self::NoSlip => Condition::NoSlip,
             Self::FreeSlip => Condition::FreeSlip,
@@ -206,7 +207,7 @@ pub enum Condition {
 
 impl Condition {
     /// Which components of the edge's own motion it leaves free.
-    pub fn lets_go(self) -> [bool; 2] {
+    pub fn leaves_free(self) -> [bool; 2] {
         match self {
             Self::NoSlip | Self::FreeSlip => [false, false],
             Self::VerticalRoller => [true, false],

@@ -8,6 +8,7 @@ pub mod phases;
 pub mod point;
 pub mod printed;
 pub mod rayleigh;
+pub mod section_view;
 pub mod soils;
 #[cfg(test)]
 mod spectrum_tests;

@@ -116,19 +116,32 @@ pub struct SoilField {
     #[serde(skip)]
     outcomes: Vec<Outcome>,
     /// Largest strain component of one step.
-    largest_step: f64,
+    largest_strain: f64,
 }
 
-/// The velocity field of a step, and what the force loop wants of it.
+/// Input of a step of the soil.
 #[derive(Clone, Copy)]
-struct Flowing<'a> {
-    geometry: &'a Geometry,
-    velocity: &'a [Vec2],
-    filter: f64,
-    dt: f64,
-    largest_step: f64,
-    /// Whether the work of the stress after the step is wanted, too.
-    with_after: bool,
+pub struct StrainStep<'a> {
+    /// Weights.
+    pub geometry: &'a Geometry,
+    /// Velocities at mid-step, m/s.
+    pub velocity: &'a [Vec2],
+    /// Strength `xi / dx` of the velocity filter, 1/m.
+    pub filter: f64,
+    /// Time step, s.
+    pub dt: f64,
+    /// Integrator of the sand model.
+    pub integrator: &'a Integrator,
+    /// Whether the work of the stress after the step is needed too.
+    pub with_after: bool,
+}
+
+/// Stress nodes and their shares in the nodal forces, in the same order.
+pub struct StressRows<'a> {
+    /// Stress nodes.
+    pub points: &'a mut [StressPoint],
+    /// Their shares.
+    pub shares: &'a mut [NodalShare],
 }
 
 /// Rows under a model with a state, whichever it is: the call through the table is one for each group and step.
@@ -136,11 +149,11 @@ trait Plastic: Debug + Send + Sync {
     fn step(
         &mut self,
         threaded: bool,
-        flowing: Flowing<'_>,
+        step: &StrainStep,
+        largest_strain: f64,
         first_row: usize,
-        rows: (&mut [StressPoint], &mut [NodalShare]),
+        rows: StressRows,
         outcomes: &mut [Outcome],
-        integrator: &Integrator,
     );
     fn void_ratio(&self, row: usize) -> Option<f64>;
     fn points(&self) -> usize;
@@ -159,22 +172,23 @@ impl<M: SoilModel> Plastic for Rowed<M> {
     fn step(
         &mut self,
         threaded: bool,
-        flowing: Flowing<'_>,
+        step: &StrainStep,
+        largest_strain: f64,
         first_row: usize,
-        (a, b): (&mut [StressPoint], &mut [NodalShare]),
+        rows: StressRows,
         outcomes: &mut [Outcome],
-        integrator: &Integrator,
     ) {
         let model = &self.model;
-        let Flowing { geometry, velocity, filter, dt, largest_step, with_after } = flowing;
-        for_each_chunk(threaded, Rows { a, b, c: &mut self.states }, outcomes, |first, rows, outcome| {
+        let StrainStep { geometry, velocity, filter, dt, integrator, with_after } = *step;
+        let rows = Rows { a: rows.points, b: rows.shares, c: &mut self.states };
+        for_each_chunk(threaded, rows, outcomes, |first, rows, outcome| {
             *outcome = Outcome::default();
             for k in 0..rows.a.len() {
                 let (point, state) = (&mut rows.a[k], &mut rows.c[k]);
                 let s = first_row + first + k;
                 let motion = motion(geometry, s, velocity);
                 let increment = motion.advance(&mut point.deformation, dt);
-                match bounded(&increment, largest_step)
+                match bounded(&increment, largest_strain)
                     .and_then(|()| model.update(state, &increment, integrator))
                 {
                     Ok(report) => outcome.report.merge(&report),
@@ -212,8 +226,8 @@ impl<M: SoilModel> Plastic for Rowed<M> {
 /// Largest strain component of one step: a thousand times what an earthquake does, and far below what plasticity
 /// would need minutes to follow. Beyond it the run has diverged.
 const LARGEST_STEP: f64 = 0.02;
-/// The same of ground that flows: where a few grains touch, a step may turn them over.
-const LARGEST_FLOWING_STEP: f64 = 0.5;
+/// The same with large displacements: where a few grains touch, a step may turn them over.
+const LARGEST_STEP_OF_GRAINS: f64 = 0.5;
 /// Refuses the strain of a diverging run before the soil model goes through it.
 fn bounded(increment: &StrainIncrement, limit: f64) -> Result<(), SoilError> {
     let value = increment.xx.abs().max(increment.yy.abs()).max(increment.xy.abs());
@@ -296,29 +310,26 @@ impl SoilField {
             .collect::<Result<Vec<_>, SolverError>>()?;
         let longest = groups.iter().map(|group| group.rows.len()).max().unwrap_or(0);
         let outcomes = vec![Outcome::default(); chunks(longest)];
-        Ok(Self { groups, inadmissible_starts: 0, outcomes, largest_step: LARGEST_STEP })
+        Ok(Self { groups, inadmissible_starts: 0, outcomes, largest_strain: LARGEST_STEP })
     }
 
-    /// Lets the soil flow.
-    pub fn let_flow(&mut self) {
-        self.largest_step = LARGEST_FLOWING_STEP;
+    /// Allows the strain steps of large displacements.
+    pub fn allow_large_steps(&mut self) {
+        self.largest_strain = LARGEST_STEP_OF_GRAINS;
     }
 
     /// Moves every stress node through one step: strain from the velocity field, stress from the soil model,
-    /// and the share that the force loop will gather. Returns what the models counted and what the stress did,
-    /// `with_after` also with the stress after the step.
+    /// and the share that the force loop will gather. Returns the counts of the models and the work of the stress.
     ///
     /// # Errors
     /// [`SolverError::Soil`] with the first node, in order, whose model failed.
     pub fn step(
         &mut self,
         threaded: bool,
-        geometry: &Geometry,
-        velocity: &[Vec2],
-        (points, shares): (&mut [StressPoint], &mut [NodalShare]),
-        (filter, dt): (f64, f64),
-        (integrator, with_after): (&Integrator, bool),
+        step: &StrainStep,
+        StressRows { points, shares }: StressRows,
     ) -> Result<(UpdateReport, StressWork), SolverError> {
+        let StrainStep { geometry, velocity, filter, dt, with_after, .. } = *step;
         let (mut total, mut work) = (UpdateReport::default(), StressWork::default());
         for group in &mut self.groups {
             let first_row = group.rows.start;
@@ -349,15 +360,8 @@ impl SoilField {
                     });
                 }
                 Law::Plastic(_, law) => {
-                    let flowing = Flowing {
-                        geometry,
-                        velocity,
-                        filter,
-                        dt,
-                        largest_step: self.largest_step,
-                        with_after,
-                    };
-                    law.step(threaded, flowing, first_row, (a, b), outcomes, integrator);
+                    let rows = StressRows { points: a, shares: b };
+                    law.step(threaded, step, self.largest_strain, first_row, rows, outcomes);
                     for outcome in &*outcomes {
                         if let Some((s, source)) = &outcome.failure {
                             let (region, node) = (group.region, s / STRESS_NODES);

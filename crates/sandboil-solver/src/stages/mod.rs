@@ -1,7 +1,8 @@
-//! What is done to a section: run-out, free-field sides, seepage, and the shear cell.
+//! Description of a stage, its presets, and the table of choices that exclude each other.
 
-pub mod column;
-pub mod free_field;
+pub mod column_record;
+pub mod gravity;
+pub mod rules;
 pub mod run_out;
-pub mod seepage;
-pub mod shear_cell;
+pub mod shaking;
+pub mod stage;

@@ -5,4 +5,5 @@ pub mod conduction;
 pub mod moving_edges;
 pub mod partly_saturated;
 pub mod pore_pressure;
+pub mod seepage;
 pub mod still_water;

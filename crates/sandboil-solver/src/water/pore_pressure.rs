@@ -10,12 +10,12 @@ use crate::{
     section::{
         description::{Model, STRESS_NODES, Water},
         node_id::id,
-        outline::{Outline, Walls},
     },
     skeleton::{
         deformation::{Cofactor, Deformation},
         phases::Phases,
         point::StressPoint,
+        section_view::SectionView,
     },
     water::{
         conduction::{Conduction, conduction},
@@ -23,7 +23,7 @@ use crate::{
         partly_saturated::Wetting,
         still_water::StillWater,
     },
-    weights::geometry::{FlowTables, Geometry},
+    weights::geometry::FlowTables,
 };
 use sandboil_sph::{Csr, Mat2, Vec2};
 
@@ -37,32 +37,16 @@ struct SurfaceNode {
     fraction: f64,
 }
 
-/// The section where it now stands.
-#[derive(Clone, Copy)]
-pub struct Ground<'a> {
-    /// The model.
-    pub model: &'a Model,
-    /// Volumes and porosities.
-    pub phases: &'a Phases,
-    /// Weights at the present place.
-    pub geometry: &'a Geometry,
-    /// Present places of the nodes, m.
-    pub position: &'a [Vec2],
-    /// The edges, and what they are.
-    pub edges: (&'a Outline, Walls),
-    /// Outward normals of the nodes at a free surface, if the ground flows: its columns are none of the lattice's then.
-    pub free_surface: Option<&'a [Option<Vec2>]>,
+/// Exchange of water in a section as it stands.
+fn conduction_of(section: &SectionView) -> Conduction {
+    let SectionView { model, geometry, position, phases, outline, walls, free_surface, .. } = *section;
+    let has_profile = free_surface.is_none();
+    conduction(model, geometry, position, phases.volume(), (outline, walls), has_profile)
 }
 
-impl Ground<'_> {
-    fn conduction(&self) -> Conduction {
-        let has_profile = self.free_surface.is_none();
-        conduction(self.model, self.geometry, self.position, self.phases.volume(), self.edges, has_profile)
-    }
-
-    fn drains(&self) -> bool {
-        self.model.regions.iter().any(|region| region.hydraulic_conductivity.major > 0.0)
-    }
+/// Whether some soil of a model lets water pass.
+fn drains(model: &Model) -> bool {
+    model.regions.iter().any(|region| region.hydraulic_conductivity.major > 0.0)
 }
 
 /// Excess pore pressure and what moves it.
@@ -137,21 +121,21 @@ impl Flow {
     /// # Errors
     /// Conditions that no node is near.
     pub fn new(
-        ground: Ground,
+        section: SectionView,
         scheme: FlowScheme,
         conditions: &[MovingBoundary],
     ) -> Result<Option<Self>, SolverError> {
-        let Ground { model, phases, .. } = ground;
+        let SectionView { model, phases, geometry, walls, free_surface, .. } = section;
         let Some(water) = model.water else { return Ok(None) };
         let conductivity = |node: usize| model.regions[model.region[node] as usize].hydraulic_conductivity;
-        let is_flowing = ground.free_surface.is_some();
+        let is_found = free_surface.is_some();
         // Ground that flows keeps the water it has above the water table.
-        let wetting = if is_flowing { None } else { Wetting::new(model, phases, !conditions.is_empty()) };
+        let wetting = if is_found { None } else { Wetting::new(model, phases, !conditions.is_empty()) };
         let drained = scheme != FlowScheme::Undrained;
         let edges = if drained && (wetting.is_some() || !conditions.is_empty()) {
             // Conditions lie on the edges as they were drawn.
-            let drawn = (&model.outline, ground.edges.1);
-            let tables = conduction(model, ground.geometry, &model.position, &model.volume, drawn, true);
+            let drawn = (&model.outline, walls);
+            let tables = conduction(model, geometry, &model.position, &model.volume, drawn, true);
             Some(WaterEdges::new(model, water, &tables, conditions)?)
         } else {
             None
@@ -159,7 +143,7 @@ impl Flow {
         let drains = |tie: &SurfaceNode| conductivity(tie.node as usize).major > 0.0;
         let is_sealed = |tie: &SurfaceNode| edges.as_ref().is_some_and(|edges| edges.seals(tie.node));
         // Nothing ties the surface of ground that flows but what crosses it.
-        let ties = if is_flowing { Vec::new() } else { surface_nodes(model, water) };
+        let ties = if is_found { Vec::new() } else { surface_nodes(model, water) };
         let surface: Vec<SurfaceNode> =
             ties.into_iter().filter(|tie| drains(tie) && !is_sealed(tie)).collect();
         // Only the acceleration term reads them.
@@ -194,13 +178,13 @@ impl Flow {
             },
             right_hand_side: vec![0.0; model.nodes()],
         };
-        flow.follow(ground, 0.0);
+        flow.follow(section, 0.0);
         Ok(Some(flow))
     }
 
     /// Takes over the porosities and forgets factors made for another geometry. `time` of the stage, s.
-    pub fn follow(&mut self, ground: Ground, time: f64) {
-        let Ground { model, phases, position, .. } = ground;
+    pub fn follow(&mut self, section: SectionView, time: f64) {
+        let SectionView { model, phases, position, free_surface, .. } = section;
         for (node, stiffness) in self.stiffness.iter_mut().enumerate() {
             let holds_air = self.still.as_ref().is_some_and(|still| still.holds_air[node]);
             *stiffness = if holds_air { 0.0 } else { self::stiffness(model, phases, node) };
@@ -211,16 +195,16 @@ impl Flow {
             wetting.follow(phases);
             wetting.update(false, &self.excess, &mut self.stiffness);
         }
-        if matches!(self.scheme, Scheme::Undrained) || !ground.drains() {
+        if matches!(self.scheme, Scheme::Undrained) || !drains(model) {
             return;
         }
-        let conduction = ground.conduction();
+        let conduction = conduction_of(&section);
         if let Some(edges) = &mut self.edges {
             let displacement = |node: u32| position[node as usize] - model.position[node as usize];
             edges.follow(&conduction, displacement);
         }
         self.switch(model, time);
-        self.tabulate(model, &conduction, ground.free_surface, time);
+        self.tabulate(model, &conduction, free_surface, time);
         if let Some(wetting) = &mut self.wetting {
             wetting.conduction = Some(conduction);
         }
@@ -231,15 +215,15 @@ impl Flow {
     pub fn stand_in(
         &mut self,
         water: StillWater,
-        ground: Ground,
+        section: SectionView,
         (neutral, excess): (Vec<f64>, &[f64]),
         holds_air: Vec<bool>,
     ) {
         let at_rest = neutral.iter().zip(excess).map(|(neutral, excess)| neutral - excess).collect();
         self.excess = neutral;
         self.still = Some(Still { water, pressure: vec![0.0; holds_air.len()], holds_air, at_rest });
-        self.carry(ground.position);
-        self.follow(ground, 0.0);
+        self.carry(section.position);
+        self.follow(section, 0.0);
     }
 
     /// Counts the excess from the still water where the nodes have come to.
@@ -652,6 +636,7 @@ mod tests {
     use crate::{
         section::{
             description::Conductivity,
+            edge_nodes::EdgeNodes,
             outline::{Condition, Outline, Walls},
         },
         testing::square_block,
@@ -660,20 +645,34 @@ mod tests {
     use sandboil_soil::VanGenuchten;
     use sandboil_sph::Period;
 
+    /// A section where it was drawn.
+    fn drawn<'a>(
+        model: &'a Model,
+        phases: &'a Phases,
+        geometry: &'a Geometry,
+        walls: Walls,
+    ) -> SectionView<'a> {
+        const NO_EDGES: &EdgeNodes = &EdgeNodes { base: Vec::new(), sides: [Vec::new(), Vec::new()] };
+        SectionView {
+            model,
+            outline: &model.outline,
+            walls,
+            edges: NO_EDGES,
+            position: &model.position,
+            phases,
+            mass: &[],
+            geometry,
+            free_surface: None,
+        }
+    }
+
     fn flow_of(model: &Model, scheme: FlowScheme) -> (Flow, Geometry) {
         let phases = Phases::new(model);
         let walls = Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]);
         let edges = (&model.outline, walls);
         let geometry = Geometry::build(model, &model.position, &model.volume, edges, None);
-        let ground = Ground {
-            model,
-            phases: &phases,
-            geometry: &geometry,
-            position: &model.position,
-            edges,
-            free_surface: None,
-        };
-        let flow = Flow::new(ground, scheme, &[]).unwrap().unwrap();
+        let section = drawn(model, &phases, &geometry, walls);
+        let flow = Flow::new(section, scheme, &[]).unwrap().unwrap();
         (flow, geometry)
     }
 
@@ -723,16 +722,7 @@ mod tests {
         let strained = StressPoint { strain: [0.0, -0.1, 0.0], ..StressPoint::default() };
         phases.follow(&vec![strained; STRESS_NODES * model.nodes()]);
         let walls = Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]);
-        let edges = (&model.outline, walls);
-        let ground = Ground {
-            model: &model,
-            phases: &phases,
-            geometry: &geometry,
-            position: &model.position,
-            edges,
-            free_surface: None,
-        };
-        flow.follow(ground, 0.0);
+        flow.follow(drawn(&model, &phases, &geometry, walls), 0.0);
         let porosity = 1.0 - 0.5 * 0.1_f64.exp();
         assert!((flow.stiffness[4] - 8.0 / porosity).abs() < 1e-12);
     }

@@ -85,6 +85,11 @@ impl StillWater {
     }
 }
 
+/// Suction and pressure at rest of every node as parts of the stress, kPa: negative or zero, and positive or zero.
+pub fn suction_and_pressure(model: &Model) -> (Vec<f64>, Vec<f64>) {
+    model.neutral_stress().into_iter().map(|p| (p.min(0.0), p.max(0.0))).unzip()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

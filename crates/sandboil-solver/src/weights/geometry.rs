@@ -89,9 +89,9 @@ impl Geometry {
         }
     }
 
-    /// Lets strain and divergence see velocities beside those of the nodes, from index `nodes` on. No force goes back
-    /// to them.
-    pub fn see_guests(
+    /// Adds weights of velocities beside those of the nodes, from index `nodes` on, to strain and divergence. No force goes
+    /// back to them.
+    pub fn add_copied_velocities(
         &mut self,
         strain: BTreeMap<usize, Vec<(u32, VectorWeight)>>,
         divergence: BTreeMap<usize, Vec<(u32, Vec2)>>,

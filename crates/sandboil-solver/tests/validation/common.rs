@@ -2,8 +2,8 @@
 
 use sandboil_soil::{Integrator, Soil, elastic::Elastic};
 use sandboil_solver::{
-    AccelerationTerm, Base, Conductivity, Diffusion, Model, Numerics, Operators, Outline, Region,
-    SHAKING_FACTOR, Shaking, UpgoingWave, Water, stress_node_offset,
+    AccelerationTerm, Base, Conductivity, Diffusion, MOVING_FACTOR, Model, Numerics, Operators, Outline,
+    Output, Region, Shaking, UpgoingWave, Water, stress_node_offset,
 };
 use sandboil_sph::{Period, Vec2};
 
@@ -76,16 +76,10 @@ pub fn shaking(wave: Option<UpgoingWave>, duration: f64, probes: Vec<Vec2>) -> S
         base: Base::shaken_by(wave),
         free_field: [false; 2],
         column_records: [None, None],
-        record_columns: None,
         local_damping: 0.0,
         rayleigh: None,
-        run_out: None,
-        time_step_factor: SHAKING_FACTOR,
-        probes,
-        history_interval: 0.001,
+        time_step_factor: MOVING_FACTOR,
         conditions: Vec::new(),
-        stress_histories: false,
-        pressure_envelope: false,
-        strain_envelope: false,
+        output: Output { probes, history_interval: 0.001, ..Output::default() },
     }
 }

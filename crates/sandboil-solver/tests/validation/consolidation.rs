@@ -37,7 +37,7 @@ fn errors(rows: usize, smoothing_ratio: f64, diffusion: Diffusion) -> [f64; 3] {
     let diffusivity = CONDUCTIVITY / (UNIT_WEIGHT * (1.0 / confined + porosity / water.bulk_modulus));
     let mut simulation = Simulation::new(&model, 1).unwrap();
     let stage = shaking(None, 0.5 * HEIGHT * HEIGHT / diffusivity, Vec::new());
-    simulation.begin_shaking(stage).unwrap();
+    simulation.begin(stage).unwrap();
     simulation.set_excess_pore_pressure(&vec![LOAD; rows]).unwrap();
     [0.05, 0.2, 0.5].map(|time_factor| {
         simulation.advance(u64::MAX, time_factor * HEIGHT * HEIGHT / diffusivity).unwrap();
@@ -191,7 +191,7 @@ mod waves_of_load {
         };
         let lowest = model.position[0].y;
         let mut simulation = Simulation::new(&model, 1).unwrap();
-        simulation.begin_shaking(shaking(None, 1e3, Vec::new())).unwrap();
+        simulation.begin(shaking(None, 1e3, Vec::new())).unwrap();
         simulation.set_excess_pore_pressure(&field(&at_once)).unwrap();
         let mut compared = Vec::new();
         for (factor, reference) in TIME_FACTORS.iter().zip(reference) {
@@ -242,7 +242,7 @@ fn undrained_block() {
             (model.period, model.outline) = (None, Outline::none());
         }
         let mut simulation = Simulation::new(&model, 1).unwrap();
-        simulation.begin_shaking(shaking(None, 1.0, Vec::new())).unwrap();
+        simulation.begin(shaking(None, 1.0, Vec::new())).unwrap();
         let press = |x: &Vec2| [if both { -1e-6 * x.x } else { 0.0 }, -1e-6 * x.y];
         simulation.set_velocity(&model.position.iter().map(press).collect::<Vec<_>>()).unwrap();
         simulation.advance(1, f64::INFINITY).unwrap();

@@ -46,8 +46,8 @@ fn a_block_follows_its_column() {
         let mut wide = at_rest(&block(HEIGHT, SPACING, COLUMNS, region.clone(), water));
         let mut narrow = at_rest(&column(HEIGHT, SPACING, 1, region, water));
         let stage = shaking(Some(pulse(5.0, 0.1)), 0.8, Vec::new());
-        wide.begin_shaking(on_free_field(stage.clone())).unwrap();
-        narrow.begin_shaking(stage).unwrap();
+        wide.begin(on_free_field(stage.clone())).unwrap();
+        narrow.begin(stage).unwrap();
         assert_eq!(wide.time_step().0, narrow.time_step().0);
         let (mut peak, mut apart) = (0.0_f64, vec![0.0_f64; wide.nodes()]);
         while !wide.is_complete() {
@@ -74,6 +74,13 @@ fn a_block_follows_its_column() {
     }
 }
 
+/// The stage with its columns recorded at an interval, s.
+fn recorded(stage: &Shaking, interval: f64) -> Shaking {
+    let mut stage = stage.clone();
+    stage.output.record_columns = Some(interval);
+    stage
+}
+
 /// A column read from the record of an earlier run moves the block as the solved one did, to the interval's curvature.
 #[test]
 fn a_recorded_column_does_what_the_solved_one_did() {
@@ -83,7 +90,7 @@ fn a_recorded_column_does_what_the_solved_one_did() {
     let model = block(HEIGHT, SPACING, 10, region, Some(WATER));
     let stage = on_free_field(shaking(Some(pulse(5.0, 0.1)), 0.5, Vec::new()));
     let mut solved = at_rest(&model);
-    solved.begin_shaking(Shaking { record_columns: Some(INTERVAL), ..stage.clone() }).unwrap();
+    solved.begin(recorded(&stage, INTERVAL)).unwrap();
     let mut velocities = Vec::new();
     while !solved.is_complete() {
         solved.advance(1, f64::INFINITY).unwrap();
@@ -93,9 +100,9 @@ fn a_recorded_column_does_what_the_solved_one_did() {
     assert!(records.iter().all(Option::is_some));
     let mut replayed = at_rest(&model);
     let short = Shaking { column_records: records.clone(), duration: 1.0, ..stage.clone() };
-    assert!(replayed.begin_shaking(short).is_err());
+    assert!(replayed.begin(short).is_err());
     let mut replayed = at_rest(&model);
-    replayed.begin_shaking(Shaking { column_records: records, ..stage.clone() }).unwrap();
+    replayed.begin(Shaking { column_records: records, ..stage.clone() }).unwrap();
     let (mut peak, mut apart) = (0.0_f64, 0.0_f64);
     for then in &velocities {
         replayed.advance(1, f64::INFINITY).unwrap();
@@ -106,13 +113,13 @@ fn a_recorded_column_does_what_the_solved_one_did() {
     }
     // A second stage reads its own record, and is refused without.
     let again = Shaking { base: Base::shaken_by(Some(pulse(5.0, -0.1))), ..stage.clone() };
-    solved.begin_shaking(Shaking { record_columns: Some(INTERVAL), ..again.clone() }).unwrap();
+    solved.begin(recorded(&again, INTERVAL)).unwrap();
     solved.advance(u64::MAX, f64::INFINITY).unwrap();
     let column_records = solved.take_column_records();
     let mut forgotten = at_rest(&model);
-    forgotten.begin_shaking(Shaking { column_records: column_records.clone(), ..stage }).unwrap();
-    assert!(forgotten.begin_shaking(again.clone()).is_err());
-    replayed.begin_shaking(Shaking { column_records, ..again }).unwrap();
+    forgotten.begin(Shaking { column_records: column_records.clone(), ..stage }).unwrap();
+    assert!(forgotten.begin(again.clone()).is_err());
+    replayed.begin(Shaking { column_records, ..again }).unwrap();
     replayed.advance(u64::MAX, f64::INFINITY).unwrap();
     let (then, now) = (solved.velocity(), replayed.velocity());
     let second = then.iter().zip(&now).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
@@ -144,7 +151,7 @@ fn stages_and_renewals_strike_no_blow() {
         let mut builds = 0;
         for &(from, duration) in stages {
             let stage = on_free_field(shaking(Some(shake(from)), duration, Vec::new()));
-            simulation.begin_shaking(stage).unwrap();
+            simulation.begin(stage).unwrap();
             assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
             builds += simulation.counters().geometry_builds;
         }
@@ -170,7 +177,7 @@ fn a_column_that_runs_away_is_told_when_the_step_returns() {
     let soil = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
     let mut section = at_rest(&block(HEIGHT, SPACING, 3, soil, None));
     let wave = UpgoingWave::shear(1e-3, vec![1e9; 1000]);
-    section.begin_shaking(on_free_field(shaking(Some(wave), 0.8, Vec::new()))).unwrap();
+    section.begin(on_free_field(shaking(Some(wave), 0.8, Vec::new()))).unwrap();
     let Err(SolverError::Column { side: "left", source }) = section.advance(1, f64::INFINITY) else {
         panic!("no word of the column")
     };

@@ -31,7 +31,7 @@ fn under_way(model: &Model, velocity: impl Fn(Vec2) -> Vec2, probes: Vec<Vec2>) 
     let mut simulation = Simulation::new(model, 2).unwrap();
     let mut stage = Shaking { free_field: [true; 2], ..shaking(None, 10.0, probes) };
     stage.base.vertical = Vertical::Absorbing;
-    simulation.begin_shaking(stage).unwrap();
+    simulation.begin(stage).unwrap();
     let field: Vec<[f64; 2]> = model.position.iter().map(|&x| velocity(x).into()).collect();
     simulation.set_velocity(&field).unwrap();
     simulation
@@ -168,7 +168,7 @@ fn shaken(
     let count = probes.len();
     let mut simulation = Simulation::new(model, 2).unwrap();
     let stage = Shaking { base, free_field: [true; 2], ..shaking(None, duration, probes) };
-    simulation.begin_shaking(stage).unwrap();
+    simulation.begin(stage).unwrap();
     assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
     let (times, values) = simulation.take_histories();
     let names = simulation.channel_names();

@@ -42,7 +42,7 @@ fn standing(duration: f64, conditions: Vec<MovingBoundary>) -> Shaking {
 
 fn run(model: &Model, stage: Shaking) -> Simulation {
     let mut simulation = Simulation::new(model, 1).unwrap();
-    simulation.begin_shaking(stage).unwrap();
+    simulation.begin(stage).unwrap();
     simulation.advance(u64::MAX, f64::INFINITY).unwrap();
     simulation
 }
@@ -149,7 +149,7 @@ fn a_drain_shortens_the_way() {
         let model = ground(1e-3, diffusion);
         let left = |conditions: Vec<MovingBoundary>| {
             let mut simulation = Simulation::new(&model, 1).unwrap();
-            simulation.begin_shaking(Shaking { conditions, ..shaking(None, time, Vec::new()) }).unwrap();
+            simulation.begin(Shaking { conditions, ..shaking(None, time, Vec::new()) }).unwrap();
             simulation.set_excess_pore_pressure(&vec![1.0; model.nodes()]).unwrap();
             simulation.advance(u64::MAX, f64::INFINITY).unwrap();
             simulation.excess_pore_pressure().unwrap()[..COLUMNS].iter().sum::<f64>() / COLUMNS as f64

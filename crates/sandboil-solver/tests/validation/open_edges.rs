@@ -37,7 +37,7 @@ fn dry_block(height: f64, spacing: f64, columns: usize) -> Model {
 fn largest_speeds(model: &Model, base: Base, duration: f64) -> [f64; 2] {
     let mut simulation = Simulation::new(model, 1).unwrap();
     let stage = Shaking { base, free_field: [true; 2], ..shaking(None, duration, Vec::new()) };
-    simulation.begin_shaking(stage).unwrap();
+    simulation.begin(stage).unwrap();
     let mut largest = [0.0_f64; 2];
     while !simulation.is_complete() {
         simulation.advance(1, f64::INFINITY).unwrap();
@@ -69,8 +69,8 @@ fn reflection(water: Option<Water>, compression: bool, vertical: Vertical) -> [f
     let mut simulation = Simulation::new(&model, 1).unwrap();
     let mut stage = shaking(None, 2.0 * HEIGHT / speed, vec![Vec2::new(0.5 * SPACING, HEIGHT)]);
     stage.base.vertical = vertical;
-    stage.history_interval = 0.01 * HEIGHT / speed;
-    simulation.begin_shaking(stage).unwrap();
+    stage.output.history_interval = 0.01 * HEIGHT / speed;
+    simulation.begin(stage).unwrap();
     let direction = if compression { [0.0, 1.0] } else { [1.0, 0.0] };
     let field: Vec<[f64; 2]> = model
         .position
@@ -126,11 +126,11 @@ fn nothing_moves_without_a_wave() {
     for water in [None, Some(WATER)] {
         let model = block(10.0, 0.5, 12, elastic(SHEAR_MODULUS, BULK_MODULUS), water);
         let mut simulation = Simulation::new(&model, 1).unwrap();
-        simulation.begin_gravity(Gravity { tolerance: 1e-6, max_steps: 40_000 }).unwrap();
+        simulation.begin(Gravity { tolerance: 1e-6, max_steps: 40_000 }).unwrap();
         assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
         let mut stage = Shaking { free_field: [true; 2], ..shaking(None, 1.0, Vec::new()) };
         stage.base.vertical = Vertical::Absorbing;
-        simulation.begin_shaking(stage).unwrap();
+        simulation.begin(stage).unwrap();
         let mut fastest = 0.0_f64;
         while !simulation.is_complete() {
             simulation.advance(1, f64::INFINITY).unwrap();
@@ -194,9 +194,7 @@ fn an_obstacle_does_not_feel_how_wide_its_domain_is() {
         let mut simulation = Simulation::new(&model, 2).unwrap();
         let base =
             Base { vertical: Vertical::Absorbing, ..Base::shaken_by(Some(sampled(DURATION, pulse(5.0)))) };
-        simulation
-            .begin_shaking(Shaking { base, free_field: [true; 2], ..shaking(None, DURATION, probes) })
-            .unwrap();
+        simulation.begin(Shaking { base, free_field: [true; 2], ..shaking(None, DURATION, probes) }).unwrap();
         assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
         simulation.take_histories().1
     };
@@ -233,9 +231,7 @@ fn segments_move_the_ground_above_them() {
     };
     let probes = vec![Vec2::new(0.0, HEIGHT), Vec2::new(WIDTH, HEIGHT)];
     let mut simulation = Simulation::new(&model, 2).unwrap();
-    simulation
-        .begin_shaking(Shaking { base, free_field: [true; 2], ..shaking(None, DURATION, probes) })
-        .unwrap();
+    simulation.begin(Shaking { base, free_field: [true; 2], ..shaking(None, DURATION, probes) }).unwrap();
     assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
     let (times, values) = simulation.take_histories();
     let names = simulation.channel_names();
@@ -322,7 +318,7 @@ fn threads_change_no_bit_between_free_field_sides() {
         let mut stage =
             Shaking { free_field: [sides; 2], ..shaking(Some(sampled(0.5, pulse(5.0))), 0.5, Vec::new()) };
         stage.base.vertical = Vertical::Absorbing;
-        simulation.begin_shaking(stage).unwrap();
+        simulation.begin(stage).unwrap();
         simulation.advance(u64::MAX, f64::INFINITY).unwrap();
         simulation
     };

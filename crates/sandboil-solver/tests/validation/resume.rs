@@ -68,9 +68,9 @@ fn shaken() -> Shaking {
     let velocity = (0..100).map(|k| 0.6 * (0.2 * f64::from(k)).sin()).collect();
     let probes = vec![Vec2::new(0.4, 0.5 * HEIGHT)];
     let mut stage = shaking(Some(UpgoingWave::shear(1e-3, velocity)), DURATION, probes);
-    stage.pressure_envelope = true;
-    stage.strain_envelope = true;
-    stage.stress_histories = true;
+    stage.output.pressure_envelope = true;
+    stage.output.strain_envelope = true;
+    stage.output.stress_histories = true;
     stage
 }
 
@@ -108,7 +108,7 @@ fn cases() -> Vec<Case> {
                 ..layered(block(HEIGHT, SPACING, COLUMNS, elastic(1.0, 1.0), Some(WATER)))
             };
             stage.free_field = [true; 2];
-            stage.record_columns = Some(0.0025);
+            stage.output.record_columns = Some(0.0025);
         }),
     ]
 }
@@ -129,7 +129,7 @@ fn stored(simulation: &Simulation) -> Vec<u8> {
 fn run(case: &Case, mut simulation: Simulation, begun: usize, mut stop: impl FnMut(Stop)) -> Simulation {
     for stage in begun..=SHAKING_STAGES {
         if stage > begun {
-            simulation.begin_shaking(case.stage.clone()).unwrap();
+            simulation.begin(case.stage.clone()).unwrap();
         }
         while !simulation.advance(STEPS_BETWEEN, f64::INFINITY).unwrap() {
             stop((stage, stored(&simulation)));
@@ -144,7 +144,7 @@ fn a_stored_run_ends_with_the_same_bits() {
     for case in cases() {
         let mut stops = Vec::new();
         let mut simulation = Simulation::new(&case.model, 1).unwrap();
-        simulation.begin_gravity(GRAVITY).unwrap();
+        simulation.begin(GRAVITY).unwrap();
         let whole = run(&case, simulation, 0, |stop| stops.push(stop));
         let (counters, expected) = (whole.counters(), stored(&whole));
         // The last stage begins with one, and renews it under way.
@@ -170,7 +170,7 @@ static SMALL: LazyLock<(Model, Vec<u8>)> = LazyLock::new(|| {
     let mut model = column(2.0, SPACING, 1, soils().pop().unwrap(), Some(WATER));
     model.numerics.diffusion = Diffusion::Implicit;
     let mut simulation = Simulation::new(&model, 1).unwrap();
-    simulation.begin_shaking(shaken()).unwrap();
+    simulation.begin(shaken()).unwrap();
     simulation.advance(20, f64::INFINITY).unwrap();
     let bytes = stored(&simulation);
     (model, bytes)

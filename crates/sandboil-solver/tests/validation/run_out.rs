@@ -10,7 +10,8 @@ use sandboil_soil::{
     elastic::Elastic,
 };
 use sandboil_solver::{
-    Conductivity, ENERGY_NAMES, Model, Outline, RunOut, Shaking, Side, Simulation, Support, Vec2, Water,
+    Conductivity, ENERGY_NAMES, MOVING_FACTOR, Model, Outline, Output, RunOut, Side, SideEdge, Simulation,
+    Stage, Support, Vec2, Water,
 };
 
 const HEIGHT: f64 = 0.1;
@@ -37,11 +38,15 @@ fn heap(spacing: f64, water: Option<Water>, conductivity: f64) -> Model {
     model
 }
 
-fn run_out(duration: f64, still_water: Option<Vec<Vec2>>) -> Shaking {
-    Shaking {
-        run_out: Some(RunOut { viscosity: 0.1, open: [false; 2], still_water }),
-        history_interval: 0.01,
-        ..shaking(None, duration, Vec::new())
+fn run_out(duration: f64, still_water: Option<Vec<Vec2>>) -> RunOut {
+    RunOut {
+        duration,
+        viscosity: 0.1,
+        open: [false; 2],
+        still_water,
+        local_damping: 0.0,
+        time_step_factor: MOVING_FACTOR,
+        output: Output { history_interval: 0.01, ..Output::default() },
     }
 }
 
@@ -78,7 +83,7 @@ fn comes_to_rest(
     rest: f64,
 ) -> (Simulation, String) {
     let mut simulation = Simulation::new(model, 2).unwrap();
-    simulation.begin_shaking(run_out(duration, still_water)).unwrap();
+    simulation.begin(run_out(duration, still_water)).unwrap();
     assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
     let (_, rows) = simulation.take_energy();
     let (kinetic, taken) = (history(&rows, "kinetic"), history(&rows, "damping"));
@@ -136,7 +141,7 @@ fn depth_of_still_water_moves_nothing() {
         let mut model = heap(0.01, Some(WATER), 1e-3);
         model.pore_pressure = model.position.iter().map(|at| WATER.unit_weight * (level - at.y)).collect();
         let mut simulation = Simulation::new(&model, 1).unwrap();
-        simulation.begin_shaking(run_out(0.1, None)).unwrap();
+        simulation.begin(run_out(0.1, None)).unwrap();
         simulation.advance(u64::MAX, f64::INFINITY).unwrap();
         simulation.position()
     };
@@ -173,7 +178,7 @@ fn excess_pressure_drains_through_the_free_surface() {
         let time = |factor: f64| factor * DEPTH * DEPTH / consolidation;
         let mut stage = run_out(time(0.5), Some(surface));
         stage.local_damping = 0.2;
-        simulation.begin_shaking(stage).unwrap();
+        simulation.begin(stage).unwrap();
         for factor in [0.05, 0.2, 0.5] {
             simulation.advance(u64::MAX, time(factor)).unwrap();
             let exact = |y: f64| -> f64 {
@@ -212,14 +217,14 @@ fn stable_ground_stays() {
     model.outline = Outline { sides: [side(0.0), side(10.0)], ..model.outline };
     for shaken in [false, true] {
         let mut simulation = Simulation::new(&model, 1).unwrap();
-        simulation.begin_gravity(sandboil_solver::Gravity { tolerance: 1e-6, max_steps: 100_000 }).unwrap();
+        simulation.begin(sandboil_solver::Gravity { tolerance: 1e-6, max_steps: 100_000 }).unwrap();
         while !simulation.advance(10_000, f64::INFINITY).unwrap() {}
         if shaken {
-            simulation.begin_shaking(shaking(None, 0.5, Vec::new())).unwrap();
+            simulation.begin(shaking(None, 0.5, Vec::new())).unwrap();
             simulation.advance(u64::MAX, f64::INFINITY).unwrap();
         }
         let before = simulation.displacement();
-        simulation.begin_shaking(run_out(1.0, None)).unwrap();
+        simulation.begin(run_out(1.0, None)).unwrap();
         simulation.advance(u64::MAX, f64::INFINITY).unwrap();
         let moved = simulation.displacement();
         let moved = moved.iter().zip(&before).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
@@ -231,11 +236,11 @@ fn stable_ground_stays() {
 
 /// The same bits with any number of threads, and from a state stored under way.
 #[test]
-fn flowing_ground_has_the_same_bits() {
+fn run_outs_have_the_same_bits() {
     let model = heap(0.005, Some(WATER), 1e-3);
     let begun = |threads: usize| {
         let mut simulation = Simulation::new(&model, threads).unwrap();
-        simulation.begin_shaking(run_out(0.06, Some(Vec::new()))).unwrap();
+        simulation.begin(run_out(0.06, Some(Vec::new()))).unwrap();
         simulation
     };
     let mut whole = begun(1);
@@ -252,30 +257,24 @@ fn flowing_ground_has_the_same_bits() {
     assert_eq!(whole.counters(), second.counters());
 }
 
-/// What no ground flows by is refused, and ground that has flowed begins nothing anew.
+/// Choices that exclude large displacements are refused, and so is any stage after one of these.
 #[test]
-fn what_does_not_flow_is_refused() {
+fn exclusive_choices_are_refused() {
     let model = heap(0.01, None, 0.0);
-    let begin = |change: &dyn Fn(&mut Shaking)| {
-        let mut stage = run_out(0.01, None);
-        change(&mut stage);
-        Simulation::new(&model, 1).unwrap().begin_shaking(stage)
-    };
-    let viscosity = |value: f64| {
-        move |stage: &mut Shaking| {
-            stage.run_out = Some(RunOut { viscosity: value, open: [false; 2], still_water: None });
-        }
-    };
-    assert!(begin(&viscosity(0.0)).is_ok());
+    let begin = |stage: Stage| Simulation::new(&model, 1).unwrap().begin(stage);
+    let braked = |viscosity: f64| begin(RunOut { viscosity, ..run_out(0.01, None) }.into());
+    assert!(braked(0.0).is_ok());
     for value in [-0.1, f64::NAN, f64::INFINITY] {
-        assert!(begin(&viscosity(value)).is_err());
+        assert!(braked(value).is_err());
     }
-    assert!(begin(&|stage| stage.free_field = [true, false]).is_err());
+    let mut beside_columns = Stage::from(run_out(0.01, None));
+    beside_columns.edges.sides[0] = SideEdge::FreeField(None);
+    assert!(begin(beside_columns).is_err());
     let mut simulation = Simulation::new(&model, 1).unwrap();
-    simulation.begin_shaking(run_out(0.01, None)).unwrap();
-    assert!(simulation.begin_shaking(run_out(0.01, None)).is_err());
+    simulation.begin(run_out(0.01, None)).unwrap();
+    assert!(simulation.begin(run_out(0.01, None)).is_err());
     let wet = heap(0.01, Some(WATER), 0.0);
     let mut simulation = Simulation::new(&wet, 1).unwrap();
-    simulation.begin_shaking(run_out(0.01, None)).unwrap();
+    simulation.begin(run_out(0.01, None)).unwrap();
     assert!(simulation.set_excess_pore_pressure(&vec![1.0; wet.nodes()]).is_err());
 }

@@ -43,7 +43,7 @@ fn layered_sand_column(crust: f64) -> Model {
 /// The section after the gravity stage.
 pub fn at_rest(model: &Model) -> Simulation {
     let mut simulation = Simulation::new(model, 1).unwrap();
-    simulation.begin_gravity(GRAVITY_STAGE).unwrap();
+    simulation.begin(GRAVITY_STAGE).unwrap();
     assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
     simulation
 }
@@ -62,7 +62,7 @@ fn nothing_moves_after_the_switch_to_the_compliant_base() {
         let before = simulation.displacement();
         let mut stage = shaking(None, 100.0, Vec::new());
         stage.rayleigh = rayleigh;
-        simulation.begin_shaking(stage).unwrap();
+        simulation.begin(stage).unwrap();
         assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
         let moved = simulation
             .displacement()
@@ -110,7 +110,7 @@ fn a_second_shaking_stage_goes_on_where_the_first_ended() {
             let mut stage = shaking(Some(wave.clone()), *duration, Vec::new());
             stage.base.half_space =
                 Some(HalfSpace { shear_speed: 200.0, compression_speed: None, density: 2.0 });
-            simulation.begin_shaking(stage).unwrap();
+            simulation.begin(stage).unwrap();
             assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
         }
         simulation
@@ -137,7 +137,7 @@ fn sharp_contacts_bear_liquefaction() {
             let wave = UpgoingWave::shear(1e-3, (0..3000).map(velocity).collect());
             let mut stage = shaking(Some(wave), 5.0, Vec::new());
             stage.rayleigh = Some(Rayleigh { ratio: 0.005, frequencies: [1.0, 10.0] });
-            simulation.begin_shaking(stage).unwrap();
+            simulation.begin(stage).unwrap();
             let mut speed = 0.0_f64;
             while !simulation.advance(50, f64::INFINITY).unwrap() {
                 speed = simulation.velocity().iter().fold(speed, |a, v| a.max(v[0].hypot(v[1])));
@@ -160,7 +160,7 @@ fn a_bursting_sand_column_is_told_at_once() {
     let velocity = (0..2000).map(|k| 0.5 * (0.03 * f64::from(k)).sin()).collect();
     let mut stage = shaking(Some(UpgoingWave::shear(1e-3, velocity)), 2.0, Vec::new());
     stage.time_step_factor = 3.0;
-    simulation.begin_shaking(stage).unwrap();
+    simulation.begin(stage).unwrap();
     let error = simulation.advance(u64::MAX, f64::INFINITY).unwrap_err();
     assert!(matches!(error, sandboil_solver::SolverError::Diverged { .. }), "{error}");
 }
@@ -171,7 +171,7 @@ fn no_state_is_handed_out_that_is_none() {
     for lost in [f64::NAN, 1e5] {
         let region = elastic(4e4, 8e4);
         let mut simulation = at_rest(&column(HEIGHT, SPACING, 1, region, Some(WATER)));
-        simulation.begin_shaking(shaking(None, 1.0, Vec::new())).unwrap();
+        simulation.begin(shaking(None, 1.0, Vec::new())).unwrap();
         let mut velocity = vec![[0.0; 2]; simulation.nodes()];
         velocity[7][0] = lost;
         simulation.set_velocity(&velocity).unwrap();
@@ -189,9 +189,9 @@ fn envelopes_see_every_step() {
     let mut simulation = at_rest(&sand_column(Operators::Conservative));
     let velocity = (0..500).map(|k| 0.3 * (0.02 * f64::from(k)).sin()).collect();
     let mut stage = shaking(Some(UpgoingWave::shear(1e-3, velocity)), 0.5, Vec::new());
-    stage.pressure_envelope = true;
-    stage.strain_envelope = true;
-    simulation.begin_shaking(stage).unwrap();
+    stage.output.pressure_envelope = true;
+    stage.output.strain_envelope = true;
+    simulation.begin(stage).unwrap();
     let mut pressure = simulation.excess_pore_pressure().unwrap();
     let mut strain = vec![0.0_f64; pressure.len()];
     while !simulation.is_complete() {
@@ -221,7 +221,7 @@ fn a_wide_section_of_low_permeability_calms_down() {
             let mut model = column(6.0, 1.0, 24, region, Some(WATER));
             model.numerics.smoothing_ratio = smoothing_ratio;
             let mut simulation = at_rest(&model);
-            simulation.begin_shaking(shaking(None, 4.0, Vec::new())).unwrap();
+            simulation.begin(shaking(None, 4.0, Vec::new())).unwrap();
             // A fixed sequence that looks like none.
             let noise = |k: usize| NOISE * (12.9898 * (k as f64) + 78.233).sin();
             let velocity: Vec<[f64; 2]> =
@@ -248,7 +248,7 @@ fn stresses_at_rest_that_the_soil_cannot_carry_are_counted() {
         let model = column(HEIGHT, SPACING, 1, region, None);
         let mut simulation = at_rest(&model);
         assert_eq!(simulation.counters().inadmissible_starts, 0);
-        simulation.begin_shaking(shaking(None, 1.0, Vec::new())).unwrap();
+        simulation.begin(shaking(None, 1.0, Vec::new())).unwrap();
         let stress_nodes = 2.0 * model.position.len() as f64;
         assert_eq!(simulation.counters().inadmissible_starts as f64, share * stress_nodes, "{phi}");
     }

@@ -89,7 +89,7 @@ fn still_water_carries_what_weighs_as_much() {
     for (slope, disorder) in cases() {
         let region = Region { solid_density: WATER.unit_weight / GRAVITY, ..soil() };
         let mut simulation = Simulation::new(&ground(slope, disorder, region), 1).unwrap();
-        simulation.begin_gravity(Gravity { tolerance: 1e-10, max_steps: 0 }).unwrap();
+        simulation.begin(Gravity { tolerance: 1e-10, max_steps: 0 }).unwrap();
         let rested = simulation.advance(1, f64::INFINITY);
         let residual = simulation.residual();
         println!("slope {slope}, disorder {disorder}: {residual:.1e} g, {rested:?}");
@@ -106,10 +106,10 @@ fn ground_under_deep_water_rests() {
         let model = ground(slope, disorder, soil());
         let rested = || {
             let mut simulation = Simulation::new(&model, 1).unwrap();
-            simulation.begin_gravity(Gravity { tolerance: 1e-6, max_steps: 20_000 }).unwrap();
+            simulation.begin(Gravity { tolerance: 1e-6, max_steps: 20_000 }).unwrap();
             simulation.advance(u64::MAX, f64::INFINITY).unwrap();
             let (steps, residual) = (simulation.step(), simulation.residual());
-            simulation.begin_shaking(shaking(None, 100.0, Vec::new())).unwrap();
+            simulation.begin(shaking(None, 100.0, Vec::new())).unwrap();
             (simulation, steps, residual)
         };
         let (mut simulation, steps, residual) = rested();

@@ -42,7 +42,7 @@ pub fn surface_velocity(
     adjust(&mut stage);
     let rising = stage.base.waves.iter().any(|wave| !wave.vertical.is_empty());
     let channel = if rising { "velocity_y" } else { "velocity_x" };
-    simulation.begin_shaking(stage).unwrap();
+    simulation.begin(stage).unwrap();
     assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
     let (times, values) = simulation.take_histories();
     let channels = simulation.channel_names();

@@ -4,13 +4,16 @@
 use crate::{
     edges::base::Impedance,
     error::SolverError,
-    run::simulation::{Gravity, Shaking, Simulation},
+    run::{neighbour::Alone, simulation::Driver},
     section::description::{Model, STRESS_NODES},
+    stages::{
+        column_record::{COMPONENTS, ColumnRecord},
+        gravity::Gravity,
+        stage::Stage,
+    },
 };
 use sandboil_sph::Vec2;
 
-/// Components of a nominal stress `[xx, xy, yx, yy]`.
-const COMPONENTS: usize = 4;
 /// What a section reads of its column in a step. Rows count from below.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Present {
@@ -42,69 +45,6 @@ impl Present {
     }
 }
 
-/// What a column did in a stage, to be read again by a section with the same column under the same motion.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct ColumnRecord {
-    /// Time between frames, s, the first at the stage's beginning; straight between them.
-    pub interval: f64,
-    /// Density and small-strain wave speeds of every row from below, when the stage began.
-    pub impedance: Vec<Impedance>,
-    /// Whether pore pressure is among the values.
-    pub wet: bool,
-    /// Frame after frame: increments of nominal stress of every stress node, of nominal pore pressure and velocity of
-    /// every row, and the base's traction.
-    pub values: Vec<f64>,
-}
-
-impl ColumnRecord {
-    /// Values of a frame of a column of `rows` rows.
-    pub fn width(rows: usize, wet: bool) -> usize {
-        let per_row = STRESS_NODES * COMPONENTS + if wet { COMPONENTS } else { 0 } + 2;
-        per_row * rows + 2
-    }
-
-    fn rows(&self) -> usize {
-        self.impedance.len()
-    }
-
-    /// Refuses what is no record of a column of `rows` rows over `duration` s.
-    ///
-    /// # Errors
-    /// The first of its figures that does not fit.
-    pub fn validate(&self, rows: usize, wet: bool, duration: f64) -> Result<(), SolverError> {
-        if self.rows() != rows || self.wet != wet {
-            let (found, expected) = (self.rows(), rows);
-            return Err(SolverError::Shape { name: "column_record", found, expected });
-        }
-        let width = Self::width(rows, wet);
-        let frames = self.values.len() / width;
-        let covered = self.interval * frames.saturating_sub(1) as f64;
-        if !self.values.len().is_multiple_of(width) || !(covered >= duration) {
-            let (name, value) = ("column_record", covered);
-            return Err(SolverError::InvalidInput { name, value, expected: "as long as the stage, in s" });
-        }
-        if let Some(&value) = self.values.iter().find(|value| !value.is_finite()) {
-            return Err(SolverError::InvalidInput { name: "column_record", value, expected: "finite" });
-        }
-        Ok(())
-    }
-
-    /// Values of a frame at any time, held after the last one.
-    fn at(&self, time: f64, into: &mut [f64]) {
-        let width = into.len();
-        let place = (time / self.interval).max(0.0);
-        let last = self.values.len() / width - 1;
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a frame's number, not negative
-        let before = (place.floor() as usize).min(last);
-        let after = (before + 1).min(last);
-        let fraction = (place - before as f64).min(1.0);
-        let (from, to) = (&self.values[width * before..][..width], &self.values[width * after..][..width]);
-        for ((value, from), to) in into.iter_mut().zip(from).zip(to) {
-            *value = from + fraction * (to - from);
-        }
-    }
-}
-
 /// A column and what a section reads of it.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Column {
@@ -116,7 +56,7 @@ pub struct Column {
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 enum Source {
     Solved {
-        simulation: Box<Simulation>,
+        simulation: Box<Driver<Alone>>,
         /// Internal index of the node of each row, from below.
         rows: Vec<usize>,
     },
@@ -133,9 +73,9 @@ impl Column {
     /// # Errors
     /// A column that finds no rest.
     pub fn at_rest(model: &Model, gravity: Option<Gravity>) -> Result<Self, SolverError> {
-        let mut simulation = Simulation::new(model, 1)?;
+        let mut simulation = Driver::new(model, 1)?;
         if let Some(gravity) = gravity {
-            simulation.begin_gravity(gravity)?;
+            simulation.begin(gravity)?;
             simulation.advance(u64::MAX, f64::INFINITY)?;
         }
         let rows = simulation.internal_order();
@@ -157,23 +97,23 @@ impl Column {
     ///
     /// # Errors
     /// Soil that refuses its stress, or a record of another column, too short or missing.
-    pub fn begin_shaking(
+    pub fn begin(
         &mut self,
-        stage: Shaking,
+        stage: Stage,
         record: Option<&ColumnRecord>,
         record_interval: Option<f64>,
     ) -> Result<(), SolverError> {
         let (rows, wet) = (self.rows(), !self.present.water.is_empty());
         match &mut self.source {
-            Source::Solved { simulation, .. } => simulation.begin_shaking(stage)?,
+            Source::Solved { simulation, .. } => simulation.begin(stage)?,
             Source::Recorded { record: read, time, .. } => {
                 let Some(record) = record else {
                     return Err(SolverError::Order {
-                        call: "begin_shaking",
+                        call: "begin",
                         needs: "a record of the stage for columns that are read",
                     });
                 };
-                record.validate(rows, wet, stage.duration)?;
+                record.validate(rows, wet, stage.duration())?;
                 (*read, *time) = (record.clone(), 0.0);
             }
         }
@@ -211,7 +151,7 @@ impl Column {
     }
 
     /// The simulation of a column that is solved.
-    pub fn simulation(&self) -> Option<&Simulation> {
+    pub fn simulation(&self) -> Option<&Driver<Alone>> {
         match &self.source {
             Source::Solved { simulation, .. } => Some(simulation),
             Source::Recorded { .. } => None,
@@ -221,10 +161,7 @@ impl Column {
     /// Gives every row an excess pore pressure, kPa, held in balance.
     pub fn set_excess(&mut self, excess: impl Iterator<Item = f64>) {
         if let Source::Solved { simulation, rows } = &mut self.source {
-            for (&row, excess) in rows.iter().zip(excess) {
-                simulation.set_excess_at(row, excess);
-            }
-            simulation.store_load();
+            simulation.hold_excess(rows.iter().copied().zip(excess));
         }
         self.observe();
     }
@@ -234,7 +171,7 @@ impl Column {
         self.observe();
         let before = self.present.clone();
         if let Source::Solved { simulation, .. } = &mut self.source {
-            simulation.renew_geometry(None);
+            simulation.renew_beside();
         }
         self.observe();
         if let Some(recorder) = &mut self.recorder {
@@ -277,7 +214,7 @@ impl Column {
         match &mut self.source {
             Source::Solved { simulation, rows } => {
                 let time = simulation.time();
-                simulation.column_step(dt)?;
+                simulation.step_beside(dt)?;
                 for (row, &node) in rows.iter().enumerate() {
                     velocity[row] = simulation.velocity_of(node);
                     acceleration[row] = simulation.acceleration_of(node);

@@ -10,8 +10,9 @@ use crate::{
     error::SolverError,
     parallel::{Pool, Rows, chunks, for_each_chunk},
     run::{
-        simulation::{CHECK_INTERVAL, Counters, RUNAWAY_SPEED, SHAKING_FACTOR, step_is_outgrown},
-        time_step::{PressureCoupling, PressureSpectrum, region_limit},
+        clock::{CHECK_INTERVAL, Counters, is_outgrown},
+        domain::RUNAWAY_SPEED,
+        time_step::{Limits, PressureCoupling, PressureSpectrum, region_limit},
     },
     section::{
         description::{Conductivity, Model, Numerics, Region, STRESS_NODES, positive},
@@ -20,9 +21,10 @@ use crate::{
     skeleton::{
         local_damping::local_damping,
         point::StressPoint,
-        soils::SoilField,
+        soils::{SoilField, StrainStep, StressRows},
         strain_and_force::{NodalShare, conservative_force, motion},
     },
+    stages::shaking::MOVING_FACTOR,
     weights::{geometry::Geometry, points::stress_node_positions},
 };
 use sandboil_soil::{
@@ -387,16 +389,15 @@ impl ShearCell {
     /// Time step at the safe share of the limit of the present stiffness, s.
     fn limit(&self) -> f64 {
         let stiffest = self.points.iter().map(|point| point.stiffness).fold(0.0, f64::max);
-        SHAKING_FACTOR
-            * region_limit(
-                (&self.model, 0),
-                stiffest,
-                PressureCoupling::None,
-                &self.spectrum,
-                None,
-                (false, None),
-            )
-            .0
+        let limits = Limits {
+            coupling: PressureCoupling::None,
+            spectrum: &self.spectrum,
+            rayleigh: None,
+            is_corrected: false,
+            viscosity: 0.0,
+            surface_is_tied: true,
+        };
+        MOVING_FACTOR * region_limit(&self.model, 0, stiffest, &limits).dt
     }
 
     /// Advances by at most `steps` steps; returns whether the test has reached its end.
@@ -450,14 +451,16 @@ impl ShearCell {
             *x += v * dt;
         }
         let filter = self.test.numerics.velocity_filter / self.test.spacing;
-        let report = self.soil.step(
-            self.threads > 1,
-            &self.geometry,
-            &self.velocity,
-            (&mut self.points, &mut self.shares),
-            (filter, dt),
-            (&self.test.numerics.integrator, false),
-        );
+        let step = StrainStep {
+            geometry: &self.geometry,
+            velocity: &self.velocity,
+            filter,
+            dt,
+            integrator: &self.test.numerics.integrator,
+            with_after: false,
+        };
+        let rows = StressRows { points: &mut self.points, shares: &mut self.shares };
+        let report = self.soil.step(self.threads > 1, &step, rows);
         let (report, _) = report.map_err(|error| match error.soil_divergence() {
             Some((quantity, node, value)) => self.diverged(quantity, node, value),
             None => error,
@@ -560,7 +563,7 @@ impl ShearCell {
             }
         }
         let target = self.limit();
-        if step_is_outgrown(self.dt, target) {
+        if is_outgrown(self.dt, target) {
             self.dt = target;
             self.counters.time_step_changes += 1;
         }

@@ -1,7 +1,13 @@
 //! Histories at points: every step enters a low-pass filter, and the filtered signal is thinned to the output
 //! interval, so that thinning folds no high frequency back.
 
-use sandboil_sph::Csr;
+use crate::{
+    run::{clock::Clock, ground::Ground},
+    skeleton::point::StressPoint,
+    stages::stage::Output,
+    weights::points::{point_weights, stress_node_positions},
+};
+use sandboil_sph::{Csr, Vec2};
 use std::{collections::VecDeque, f64::consts::PI};
 
 /// Half-width of the filter in output intervals.
@@ -22,13 +28,105 @@ fn filter_weight(distance: f64) -> f64 {
     sinc * (0.42 + 0.5 * phase.cos() + 0.08 * (2.0 * phase).cos())
 }
 
-/// Where histories are read: weights on velocity nodes and on stress nodes.
-#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
-pub struct Probes {
-    /// Rows are probes, columns velocity nodes.
-    pub velocity: Csr<f64>,
-    /// Rows are probes, columns stress nodes.
-    pub stress: Csr<f64>,
+/// Histories of a stage at its probes.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+pub struct Histories {
+    /// Weights of the velocity nodes: rows are probes.
+    of_nodes: Csr<f64>,
+    /// Weights of the stress nodes: rows are probes; empty unless they are read.
+    of_stress: Option<Csr<f64>>,
+    recorder: Recorder,
+    sample: Vec<f64>,
+}
+
+impl Histories {
+    /// Histories at the probes of a stage that begins with a time step, s.
+    pub fn new(ground: &Ground, output: &Output, dt: f64) -> Self {
+        let Ground { model, position, .. } = ground;
+        let of_stress = output
+            .stress_histories
+            .then(|| point_weights(model, &stress_node_positions(position, model.spacing), &output.probes));
+        let channels = output.probes.len() * channel_names(ground.water.is_some(), of_stress.is_some()).len();
+        Self {
+            of_nodes: point_weights(model, position, &output.probes),
+            of_stress,
+            recorder: Recorder::new(channels, output.history_interval, dt),
+            sample: vec![0.0; channels],
+        }
+    }
+
+    /// Names of the channels of each probe. Stress is effective, tension positive.
+    pub fn channel_names(&self, ground: &Ground) -> Vec<&'static str> {
+        channel_names(ground.water.is_some(), self.of_stress.is_some())
+    }
+
+    /// Takes a sample of a step whose accelerations are known and whose nodes have not moved: all quantities belong to
+    /// the same instant.
+    pub fn record(&mut self, ground: &Ground, clock: &Clock) {
+        let Ground { model, position, velocity, acceleration, water, points, .. } = ground;
+        let mut slot = 0;
+        let mut put = |value: f64| {
+            self.sample[slot] = value;
+            slot += 1;
+        };
+        for probe in 0..self.of_nodes.rows() {
+            let (mut a, mut v, mut u) = (Vec2::zeros(), Vec2::zeros(), Vec2::zeros());
+            let mut excess = 0.0;
+            for (j, &weight) in self.of_nodes.iter_row(probe) {
+                a += acceleration[j] * weight;
+                v += (velocity[j] - acceleration[j] * (0.5 * clock.dt)) * weight;
+                u += (position[j] - model.position[j]) * weight;
+                excess += water.as_ref().map_or(0.0, |flow| flow.excess(j)) * weight;
+            }
+            for vector in [a, v, u] {
+                put(vector.x);
+                put(vector.y);
+            }
+            if water.is_some() {
+                put(excess);
+            }
+            if let Some(weights) = &self.of_stress {
+                let mut sum = [0.0; 6];
+                for (s, weight) in weights.iter_row(probe) {
+                    let StressPoint { stress, strain, .. } = &points[s];
+                    let read = [stress.xx, stress.yy, stress.xy, strain[0], strain[1], strain[2]];
+                    for (total, value) in sum.iter_mut().zip(read) {
+                        *total += weight * value;
+                    }
+                }
+                sum.into_iter().for_each(&mut put);
+            }
+        }
+        self.recorder.push(clock.time, clock.dt, &self.sample);
+    }
+
+    /// Closes the samples still collecting, at the end of the stage or of the run, `time` in s.
+    pub fn finish(&mut self, time: f64) {
+        self.recorder.finish(time);
+    }
+
+    /// Takes the finished samples out: times (s) and one row for each time, probe after probe.
+    pub fn take(&mut self) -> (Vec<f64>, Vec<f64>) {
+        self.recorder.take()
+    }
+}
+
+fn channel_names(water: bool, stress: bool) -> Vec<&'static str> {
+    let mut names = vec![
+        "acceleration_x",
+        "acceleration_y",
+        "velocity_x",
+        "velocity_y",
+        "displacement_x",
+        "displacement_y",
+    ];
+    if water {
+        names.push("excess_pore_pressure");
+    }
+    if stress {
+        names.extend(["stress_xx", "stress_yy", "stress_xy", "strain_xx", "strain_yy", "gamma_xy"]);
+    }
+    names
 }
 
 /// Filtered, thinned samples of a fixed set of channels.

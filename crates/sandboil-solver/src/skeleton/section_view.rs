@@ -7,23 +7,29 @@ use crate::{
         outline::{Outline, Walls},
     },
     skeleton::phases::Phases,
+    weights::geometry::Geometry,
 };
 use sandboil_sph::Vec2;
 
-/// What the tables are built from: the section as it stands.
-pub struct Section<'a> {
+/// A section as it stands.
+#[derive(Clone, Copy)]
+pub struct SectionView<'a> {
     /// Its description.
     pub model: &'a Model,
     /// Its edges as they stand.
     pub outline: &'a Outline,
-    /// What they do.
+    /// How the edges act.
     pub walls: Walls,
     /// Its nodes along the edges.
     pub edges: &'a EdgeNodes,
-    /// Where the nodes are, m.
+    /// Present places of the nodes, m.
     pub position: &'a [Vec2],
-    /// Volumes and densities.
+    /// Volumes, porosities and densities.
     pub phases: &'a Phases,
     /// Mass of each node, Mg/m.
     pub mass: &'a [f64],
+    /// Weights at the present place.
+    pub geometry: &'a Geometry,
+    /// Outward normals of the nodes at the free surface, if it is found instead of tied to the nodes of the lattice.
+    pub free_surface: Option<&'a [Option<Vec2>]>,
 }

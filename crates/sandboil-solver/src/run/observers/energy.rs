@@ -8,36 +8,43 @@
 //! A step costs no loop of its own: constant forces and water do half their work where the next step reads the velocity
 //! between both, and motion is looked at where a sample is taken.
 
-use crate::skeleton::{phases::Phases, soils::StressWork};
+use crate::{
+    run::forces::Power,
+    skeleton::{phases::Phases, soils::StressWork},
+};
 
 /// Names of the columns of a history of energy, in order; masses are Mg/m, all else is kJ/m.
-pub const ENERGY_NAMES: [&str; 11] = [
+pub const ENERGY_NAMES: [&str; 15] = [
     "kinetic",
     "stress",
     "water",
     "damping",
     "local_damping",
-    "constant_forces",
+    "weight",
+    "still_water",
+    "reaction",
+    "renewal_force",
+    "load",
     "base",
     "sides",
     "renewal",
     "solid_mass",
     "water_mass",
 ];
-/// Energy of a section in a stage of shaking, kJ/m; works count from its beginning.
+
+/// Energy of a section in a stage, kJ/m; works count from its beginning.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Energy {
     /// Of the motion at the beginning.
     kinetic_before: f64,
-    /// Done on the soil by its effective stress, all of the last strain increment included; what it stores and what its
-    /// plasticity takes.
+    /// Done on the soil by its effective stress, all of the last strain increment included: stored, or taken by plasticity.
     stress: f64,
     /// Given to the pore water beyond its state at rest.
     water: f64,
     /// Taken by local damping.
     local_damping: f64,
-    /// Done by gravity and the reactions stored at rest.
-    constant: f64,
+    /// Done by the constant forces.
+    constant: ConstantWork,
     /// Brought in by the base's dashpots.
     base: f64,
     /// Brought in by free-field sides, also through the strain that the columns' motion gives.
@@ -48,13 +55,30 @@ pub struct Energy {
     owed: f64,
 }
 
-/// Power of nodal forces on a velocity field, kW/m.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Power {
-    /// Of gravity and of the reactions stored at rest.
-    pub constant: f64,
-    /// Of the pore water on the soil.
-    pub water: f64,
+/// Work of the constant forces by origin, kJ/m.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+struct ConstantWork {
+    /// Of all of them.
+    total: f64,
+    weight: f64,
+    still_water: f64,
+    renewal: f64,
+    load: f64,
+}
+
+impl ConstantWork {
+    fn add(&mut self, power: &Power, time: f64) {
+        self.total += time * power.constant;
+        self.weight += time * power.weight;
+        self.still_water += time * power.still_water;
+        self.renewal += time * power.renewal;
+        self.load += time * power.load;
+    }
+
+    /// Of the reaction: what no other part does.
+    fn reaction(&self) -> f64 {
+        self.total - self.weight - self.still_water - self.renewal - self.load
+    }
 }
 
 /// Work of a step, kJ/m: each force on the mean of the velocities before and after it.
@@ -64,7 +88,7 @@ pub struct EdgeWork {
     pub base: f64,
     /// Of free-field sides.
     pub sides: f64,
-    /// What local damping takes.
+    /// Taken by local damping.
     pub local_damping: f64,
 }
 
@@ -74,44 +98,44 @@ impl Energy {
         Self { kinetic_before: kinetic, ..Self::default() }
     }
 
-    /// Takes over the power of the last step's forces on the velocity that it left: the half of its work still owed.
-    pub fn end_step(&mut self, last: Power) {
-        self.constant += 0.5 * self.owed * last.constant;
+    /// Adds the half of the last step's work that is still owed: the power of its forces on the velocity that it left.
+    pub fn end_step(&mut self, last: &Power) {
+        self.constant.add(last, 0.5 * self.owed);
         self.water -= 0.5 * self.owed * last.water;
         self.owed = 0.0;
     }
 
-    /// Takes over the power of a step's forces on the velocity that it meets; half of its work, over `dt` in s.
-    pub fn begin_step(&mut self, dt: f64, power: Power) {
-        self.constant += 0.5 * dt * power.constant;
+    /// Adds half of a step's work, over `dt` in s: the power of its forces on the velocity at its beginning.
+    pub fn begin_step(&mut self, dt: f64, power: &Power) {
+        self.constant.add(power, 0.5 * dt);
         self.water -= 0.5 * dt * power.water;
         self.owed = dt;
     }
 
-    /// Takes over what edges and local damping did in a step.
+    /// Adds the work of edges and local damping in a step.
     pub fn step(&mut self, work: &EdgeWork) {
         self.base += work.base;
         self.sides += work.sides;
         self.local_damping += work.local_damping;
     }
 
-    /// Takes over the kinetic energy that a renewal of the geometry gave, kJ/m.
+    /// Adds the kinetic energy that a renewal of the geometry gave, kJ/m.
     pub fn renew(&mut self, gained: f64) {
         self.renewal += gained;
     }
 
-    /// Takes over the work of stress in a step's strain, kJ/m.
+    /// Adds the work of stress in a step's strain, kJ/m.
     pub fn strain(&mut self, work: StressWork) {
         self.stress += work.mean;
     }
 
     /// The columns of [`ENERGY_NAMES`] but the masses, from the kinetic energy and the work of the stress `after` the last
-    /// strain increment in it, kJ/m. What the forces of stress, velocity filter and Rayleigh damping have taken is what is
-    /// not found elsewhere.
-    fn columns(&self, kinetic: f64, after: f64) -> [f64; 9] {
+    /// strain increment in it, kJ/m. What the forces of stress, velocity filter and Rayleigh damping have taken is the
+    /// remainder.
+    fn columns(&self, kinetic: f64, after: f64) -> [f64; 13] {
         // Half of the last increment, with the stress after it, belongs to the next step's force.
         let stress = self.stress - 0.5 * after;
-        let given = self.constant + self.base + self.sides + self.renewal;
+        let given = self.constant.total + self.base + self.sides + self.renewal;
         let held = (kinetic - self.kinetic_before) + self.water + self.local_damping;
         [
             kinetic,
@@ -119,7 +143,11 @@ impl Energy {
             self.water,
             given - held - stress,
             self.local_damping,
-            self.constant,
+            self.constant.weight,
+            self.constant.still_water,
+            self.constant.reaction(),
+            self.constant.renewal,
+            self.constant.load,
             self.base,
             self.sides,
             self.renewal,

@@ -1,0 +1,451 @@
+//! Free-field sides (Section 4.2): beyond each side the ground goes on as a column that moves on its own, solved first and
+//! one-way. It pushes the section with its stress, and dashpots between the two let out what the section sends.
+//!
+//! The push is what the section's own force operator would feel of soil beyond the side under the column's stress: the
+//! weights of stencils completed by columns beyond the side, less those of the cut ones. Strain is treated alike: the cut
+//! stencils see the difference to the column's motion, the completed ones the column's. A section that does as the column
+//! does is then held exactly as the column is, corners included, and neither coupling answers to what the section does
+//! otherwise: that is left to the dashpots (Eq. 15 as corrected).
+
+use crate::{
+    edges::{
+        base::BaseSegment,
+        dashpots::{Dashpot, Dashpots, NodalMotion, trace},
+    },
+    error::SolverError,
+    neighbours::{
+        column::{Column, Present},
+        side_tables::{Rows, SideTables},
+    },
+    run::{
+        neighbour::{Alone, Neighbour},
+        simulation::Driver,
+        time_step::{PressureCoupling, TimeLimit},
+    },
+    section::{
+        description::{Model, STRESS_NODES},
+        edge_nodes::EdgeNodes,
+        node_id::id,
+        outline::{Hand, Outline, Side},
+    },
+    skeleton::{point::StressPoint, section_view::SectionView},
+    stages::{column_record::ColumnRecord, gravity::Gravity, stage::Stage},
+    weights::geometry::Geometry,
+};
+use sandboil_sph::{Csr, Period, Vec2};
+use std::collections::BTreeMap;
+
+/// Relative difference up to which two columns' stresses are the same: they are computed, not read.
+const SAME: f64 = 1e-9;
+/// Columns beyond the sides of a section and their coupling with it.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+pub struct FreeField {
+    columns: Vec<Column>,
+    sides: Vec<CoupledSide>,
+}
+
+/// What acts on the section at one side.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+struct CoupledSide {
+    hand: Hand,
+    /// Where the side stands when shaking begins, m.
+    x: f64,
+    column: usize,
+    dashpots: Dashpots,
+    /// Weights of the column's rows in the motion that the dashpots' points would have with it.
+    trace: Csr<f64>,
+    tables: SideTables,
+    /// Nominal stress and pore pressure of the column when increments began, kPa.
+    reference: Vec<[f64; 4]>,
+    reference_water: Vec<[f64; 4]>,
+    /// Velocities towards which the dashpots pull, m/s.
+    targets: Vec<f64>,
+    /// Force of the step on the nodes of the tables, kN/m.
+    force: Vec<Vec2>,
+    /// Stress nodes that see the column's motion.
+    strained: Vec<usize>,
+}
+
+/// The segment of the base that the wave of a side passes.
+fn segment_at(stage: &Stage, x: f64) -> BaseSegment {
+    stage.compliant_base().map_or_else(|| BaseSegment::everywhere(None), |base| base.at(x))
+}
+
+impl FreeField {
+    /// The columns that are solved.
+    fn solved(&self) -> impl Iterator<Item = &Driver<Alone>> {
+        self.columns.iter().filter_map(Column::simulation)
+    }
+
+    /// Builds the coupling at the present place; pushes count from here.
+    fn renew_tables(&mut self, section: &SectionView) {
+        for side in &mut self.sides {
+            let column = &self.columns[side.column];
+            side.tables = SideTables::new(section, side.hand);
+            side.force = vec![Vec2::zeros(); side.tables.nodes.len()];
+            side.targets = vec![0.0; side.dashpots.all().len()];
+            side.begin_increments(column);
+        }
+    }
+
+    /// Copies the columns' motion to where the section's strain reads it.
+    fn copy_motion(&self, velocity: &mut [Vec2], acceleration: &mut [Vec2]) {
+        let copied = self.sides.iter().flat_map(|side| {
+            let present = self.columns[side.column].present();
+            present.velocity.iter().zip(&present.acceleration)
+        });
+        for ((v, a), (copied_v, copied_a)) in velocity.iter_mut().zip(acceleration).zip(copied) {
+            (*v, *a) = (*copied_v, *copied_a);
+        }
+    }
+}
+
+impl Neighbour for FreeField {
+    fn new(
+        section: &SectionView,
+        stage: &Stage,
+        gravity: Option<Gravity>,
+    ) -> Result<Option<Self>, SolverError> {
+        let mut free_field = Self { columns: Vec::new(), sides: Vec::new() };
+        let mut made: Vec<(Model, BaseSegment)> = Vec::new();
+        for (hand, wanted) in Hand::BOTH.into_iter().zip(stage.free_field()) {
+            let (true, Some(side)) = (wanted, section.outline.sides[hand as usize]) else { continue };
+            let model = column_model(section, hand);
+            let segment = segment_at(stage, side.x);
+            let same =
+                made.iter().position(|(other, arrival)| *arrival == segment && same_column(other, &model));
+            let column = match (same, stage.column_record(hand)) {
+                (Some(column), _) => column,
+                (None, recorded) => {
+                    free_field.columns.push(match recorded {
+                        Some(record) => {
+                            record.validate(model.nodes(), model.water.is_some(), stage.duration())?;
+                            Column::recorded(record.clone())
+                        }
+                        None => {
+                            Column::at_rest(&model, gravity).map_err(|error| on_side(hand, side.x, error))?
+                        }
+                    });
+                    made.push((model, segment));
+                    made.len() - 1
+                }
+            };
+            free_field.sides.push(CoupledSide {
+                hand,
+                x: side.x,
+                column,
+                dashpots: Dashpots::default(),
+                trace: Csr::default(),
+                tables: SideTables::default(),
+                reference: Vec::new(),
+                reference_water: Vec::new(),
+                targets: Vec::new(),
+                force: Vec::new(),
+                strained: Vec::new(),
+            });
+        }
+        if free_field.columns.is_empty() {
+            return Ok(None);
+        }
+        free_field.begin(section, stage)?;
+        Ok(Some(free_field))
+    }
+
+    /// Columns are shaken by the wave that arrives at their side.
+    fn begin(&mut self, section: &SectionView, stage: &Stage) -> Result<(), SolverError> {
+        let lowest = section.model.outline.lowest();
+        let mut begun = vec![false; self.columns.len()];
+        for k in 0..self.sides.len() {
+            let CoupledSide { hand, column, .. } = self.sides[k];
+            let Some(side) = section.outline.sides[hand as usize] else { continue };
+            if !std::mem::replace(&mut begun[column], true) {
+                let of_column = stage.of_column(segment_at(stage, side.x), lowest);
+                self.columns[column]
+                    .begin(of_column, stage.column_record(hand), stage.output.record_columns)
+                    .map_err(|error| on_side(hand, side.x, error))?;
+            }
+            (self.sides[k].dashpots, self.sides[k].trace) =
+                side_dashpots(section, (hand, side), &self.columns[column])?;
+        }
+        self.renew_tables(section);
+        Ok(())
+    }
+
+    fn renew(&mut self, section: &SectionView) {
+        for column in &mut self.columns {
+            column.renew_geometry();
+        }
+        self.renew_tables(section);
+    }
+
+    fn set_excess(&mut self, edges: &EdgeNodes, excess: &[f64]) {
+        for side in &mut self.sides {
+            let column = &mut self.columns[side.column];
+            column.set_excess(edges.sides[side.hand as usize].iter().map(|&node| excess[node]));
+            side.begin_increments(column);
+        }
+    }
+
+    fn copied_velocities(&self) -> usize {
+        self.sides.iter().map(|side| self.columns[side.column].rows()).sum()
+    }
+
+    fn couple(&mut self, geometry: &mut Geometry, nodes: usize) {
+        let mut first = id(nodes);
+        for side in &mut self.sides {
+            let (strain, divergence) =
+                (std::mem::take(&mut side.tables.strain), std::mem::take(&mut side.tables.divergence));
+            side.strained = strain.keys().copied().collect();
+            geometry.add_copied_velocities(renumbered(strain, first), renumbered(divergence, first));
+            first += id(self.columns[side.column].rows());
+        }
+    }
+
+    /// The traction of the columns' bases is no part of it: it passes.
+    fn add_push(&mut self, force: &mut [Vec2]) {
+        for column in &mut self.columns {
+            column.observe();
+        }
+        for side in &mut self.sides {
+            side.push(self.columns[side.column].present());
+            for (&node, pushed) in side.tables.nodes.iter().zip(&side.force) {
+                force[node] += pushed;
+            }
+        }
+    }
+
+    fn is_strained(&self) -> bool {
+        self.solved().any(Driver::is_strained)
+    }
+
+    fn limit(&self, coupling: PressureCoupling, factor: f64) -> Option<TimeLimit> {
+        self.solved().map(|column| column.limit(coupling, factor)).reduce(TimeLimit::least)
+    }
+
+    /// Equal columns give their record once for both sides.
+    fn take_records(&mut self) -> [Option<ColumnRecord>; 2] {
+        let taken: Vec<Option<ColumnRecord>> = self.columns.iter_mut().map(Column::take_record).collect();
+        let mut records = [None, None];
+        for side in &self.sides {
+            records[side.hand as usize].clone_from(&taken[side.column]);
+        }
+        records
+    }
+
+    fn begin_step(&mut self, dt: f64, velocity: &[Vec2]) -> Result<(), SolverError> {
+        for column in &mut self.columns {
+            column.observe();
+        }
+        for side in &mut self.sides {
+            side.push(self.columns[side.column].present());
+            side.dashpots.begin_step(velocity);
+        }
+        for (k, column) in self.columns.iter_mut().enumerate() {
+            column.step(dt).map_err(|error| of_column(&self.sides, k, error))?;
+        }
+        for side in &mut self.sides {
+            let traction = self.columns[side.column].present().base_traction;
+            for (force, length) in side.force.iter_mut().zip(&side.tables.base) {
+                *force += traction * *length;
+            }
+        }
+        Ok(())
+    }
+
+    fn guard(&self) -> Result<(), SolverError> {
+        for (k, column) in self.columns.iter().enumerate() {
+            let Some(simulation) = column.simulation() else { continue };
+            simulation.guard().map_err(|error| of_column(&self.sides, k, error))?;
+        }
+        Ok(())
+    }
+
+    fn push(&self, dt: f64, mass: &[f64], motion: &mut NodalMotion) {
+        for side in &self.sides {
+            for (&node, force) in side.tables.nodes.iter().zip(&side.force) {
+                motion.add(node, force / mass[node], dt);
+            }
+        }
+    }
+
+    /// The dashpots pull towards the columns' motion.
+    fn end_step(&mut self, dt: f64, mass: &[f64], motion: &mut NodalMotion) {
+        for side in &mut self.sides {
+            let present = self.columns[side.column].present();
+            let CoupledSide { dashpots, trace, targets, .. } = side;
+            // The column's motion as the section's own trace would read it.
+            for (target, dashpot) in targets.iter_mut().zip(dashpots.all()) {
+                let read = |(row, weight): (usize, &f64)| {
+                    let twice = present.velocity[row] + present.velocity_before[row];
+                    weight * twice.dot(&dashpot.direction)
+                };
+                *target = 0.5 * trace.iter_row(dashpot.point).map(read).sum::<f64>();
+            }
+            dashpots.end_step(dt, mass, motion, |k| targets[k]);
+        }
+        self.copy_motion(&mut motion.velocity[mass.len()..], &mut motion.acceleration[mass.len()..]);
+    }
+
+    /// The work of pushes and dashpots, and that of the section's stress in the strain that the copied velocities give it,
+    /// from which no force comes back.
+    fn work(
+        &self,
+        dt: f64,
+        velocity: &[Vec2],
+        acceleration: &[Vec2],
+        geometry: &Geometry,
+        points: &[StressPoint],
+    ) -> f64 {
+        let path = |node: usize| (velocity[node] - acceleration[node] * (0.5 * dt)) * dt;
+        let copies = velocity.len() - self.copied_velocities();
+        let strained = |&s: &usize| {
+            let StressPoint { stress, volume, deformation, .. } = &points[s];
+            let nominal = deformation.cofactor().nominal(stress);
+            let copied = geometry.wall.forward.iter_row(s).filter(|(column, _)| *column >= copies);
+            copied.map(|(column, weight)| weight.contract(nominal).dot(&path(column)) * volume).sum::<f64>()
+        };
+        let of_side = |side: &CoupledSide| {
+            let pushed: f64 =
+                side.tables.nodes.iter().zip(&side.force).map(|(&node, force)| force.dot(&path(node))).sum();
+            pushed + side.dashpots.work(dt, velocity) + side.strained.iter().map(strained).sum::<f64>()
+        };
+        self.sides.iter().map(of_side).sum()
+    }
+
+    /// Columns included.
+    fn bytes(&self) -> usize {
+        let side = |side: &CoupledSide| {
+            side.dashpots.bytes()
+                + side.trace.bytes()
+                + size_of_val(side.targets.as_slice())
+                + side.tables.bytes()
+                + size_of_val(side.reference.as_slice())
+                + size_of_val(side.reference_water.as_slice())
+                + size_of_val(side.force.as_slice())
+        };
+        self.columns.iter().map(Column::bytes).sum::<usize>() + self.sides.iter().map(side).sum::<usize>()
+    }
+}
+
+/// Rows of the column as copied velocities from index `first` on.
+fn renumbered<T>(mut rows: BTreeMap<usize, Vec<(u32, T)>>, first: u32) -> BTreeMap<usize, Vec<(u32, T)>> {
+    for (column, _) in rows.values_mut().flatten() {
+        *column += first;
+    }
+    rows
+}
+
+/// An error of a column, told with the first side that it belongs to.
+fn of_column(sides: &[CoupledSide], column: usize, error: SolverError) -> SolverError {
+    match sides.iter().find(|side| side.column == column) {
+        Some(side) => on_side(side.hand, side.x, error),
+        None => error,
+    }
+}
+
+/// An error of the column at a side, told with its place.
+fn on_side(hand: Hand, x: f64, mut error: SolverError) -> SolverError {
+    if let SolverError::Diverged { x: told, .. } = &mut error {
+        *told = x;
+    }
+    SolverError::Column { side: hand.name(), source: Box::new(error) }
+}
+
+impl CoupledSide {
+    /// Lets pushes count from what the column now is.
+    fn begin_increments(&mut self, column: &Column) {
+        self.reference.clone_from(&column.present().stress);
+        self.reference_water.clone_from(&column.present().water);
+    }
+
+    /// Force of the increments of the column's stress and pressure on the section (Eq. 6 beyond the side).
+    fn push(&mut self, present: &Present) {
+        for (row, force) in self.force.iter_mut().enumerate() {
+            *force = Vec2::zeros();
+            for (s, weight) in self.tables.stress.iter_row(row) {
+                *force -= weight.contract(difference(&present.stress[s], &self.reference[s]));
+            }
+            for (i, weight) in self.tables.pressure.iter_row(row) {
+                let [xx, xy, yx, yy] = difference(&present.water[i], &self.reference_water[i]);
+                *force += Vec2::new(xx * weight.x + xy * weight.y, yx * weight.x + yy * weight.y);
+            }
+        }
+    }
+}
+
+fn difference(a: &[f64; 4], b: &[f64; 4]) -> [f64; 4] {
+    [0, 1, 2, 3].map(|c| a[c] - b[c])
+}
+
+/// The soil at a side as a column between periodic sides.
+fn column_model(section: &SectionView, hand: Hand) -> Model {
+    let SectionView { model, outline, edges, .. } = section;
+    let nodes = &edges.sides[hand as usize];
+    // The column starts where the section did: its rest is found on the undeformed lattice.
+    let x = nodes.first().map_or(0.0, |&node| model.position[node].x);
+    let pick = |values: &[f64]| nodes.iter().filter_map(|&node| values.get(node).copied()).collect();
+    let middle = 0.5 * model.spacing.x;
+    Model {
+        position: nodes.iter().map(|&node| Vec2::new(middle, model.position[node].y)).collect(),
+        volume: pick(&model.volume),
+        region: nodes.iter().map(|&node| model.region[node]).collect(),
+        surface_elevation: pick(&model.surface_elevation),
+        vertical_effective_stress: nodes
+            .iter()
+            .flat_map(|&node| [0, 1].map(|k| model.vertical_effective_stress[STRESS_NODES * node + k]))
+            .collect(),
+        pore_pressure: pick(&model.pore_pressure),
+        saturation: pick(&model.saturation),
+        period: Some(Period { width: model.spacing.x }),
+        outline: Outline {
+            base_support: outline.base_support,
+            ..Outline::level(model.outline.base_elevation(x))
+        },
+        ..(*model).clone()
+    }
+}
+
+/// Whether two columns are made of the same rows.
+fn same_column(a: &Model, b: &Model) -> bool {
+    let close = |a: &[f64], b: &[f64]| {
+        a.len() == b.len()
+            && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME * a.abs().max(b.abs()).max(1.0))
+    };
+    let heights = |model: &Model| model.position.iter().map(|x| x.y).collect::<Vec<_>>();
+    a.region == b.region
+        && close(&heights(a), &heights(b))
+        && close(&a.volume, &b.volume)
+        && close(&a.vertical_effective_stress, &b.vertical_effective_stress)
+        && close(&a.pore_pressure, &b.pore_pressure)
+        && close(&a.saturation, &b.saturation)
+        && close(&a.surface_elevation, &b.surface_elevation)
+        && close(&[a.outline.base_elevation(0.0)], &[b.outline.base_elevation(0.0)])
+}
+
+/// A dashpot across and one along the side for each of its rows, of the column's small-strain speeds, and the trace at
+/// their points over the rows of the column.
+fn side_dashpots(
+    section: &SectionView,
+    (hand, side): (Hand, Side),
+    column: &Column,
+) -> Result<(Dashpots, Csr<f64>), SolverError> {
+    let SectionView { model, position, edges, .. } = section;
+    let nodes = &edges.sides[hand as usize];
+    let points: Vec<Vec2> = nodes.iter().map(|&node| Vec2::new(side.x, position[node].y)).collect();
+    let mut all = Vec::with_capacity(2 * nodes.len());
+    for (point, below) in column.impedance()?.into_iter().enumerate() {
+        let (eta_s, eta_p) = (below.density * below.shear_speed, below.density * below.compression_speed);
+        for (direction, impedance) in [(Vec2::x(), eta_p), (Vec2::y(), eta_s)] {
+            all.push(Dashpot { point, direction, impedance, length: model.spacing.y });
+        }
+    }
+    let trace = trace(model, position, &points, nodes);
+    let rows = Rows::of(section, hand);
+    let mut over_rows = Csr::with_capacity(trace.rows(), trace.entries());
+    for point in 0..trace.rows() {
+        let row =
+            trace.iter_row(point).map(|(node, &weight)| (id(rows.nearest(model.position[node].y)), weight));
+        over_rows.push_row(&mut row.collect::<Vec<_>>());
+    }
+    Ok((Dashpots::new(all, trace, section.mass), over_rows))
+}

@@ -1,0 +1,292 @@
+//! Weights of a free-field column in the force and strain of the section beside it: those of stencils completed by the
+//! column beyond the side, less those of the cut ones.
+
+use crate::{
+    section::{
+        description::{Operators, STRESS_NODES},
+        node_id::id,
+        outline::{Hand, Outline},
+    },
+    skeleton::section_view::SectionView,
+    weights::{
+        images::Surroundings,
+        points::stress_node_positions,
+        rows::{StrainRow, VectorWeight, divergence_row},
+        stencils::Stencils,
+    },
+};
+use sandboil_sph::{Csr, LeastSquaresFit, NeighbourList, Vec2, WendlandQuintic};
+use std::collections::BTreeMap;
+
+/// Difference of a completed and a cut weight that is round-off, over the inverse of the spacing.
+pub const NO_DIFFERENCE: f64 = 1e-12;
+
+/// Weights of the column's stress, pressure and base traction in the force on nodes near a side.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct SideTables {
+    /// Nodes on which the column acts.
+    pub nodes: Vec<usize>,
+    /// Volume times weight: rows are `nodes`, columns the stress nodes of the column's rows.
+    pub stress: Csr<VectorWeight>,
+    /// Volume times weight: rows are `nodes`, columns the column's rows; empty without water.
+    pub pressure: Csr<Vec2>,
+    /// Length of base whose traction the cut trace misses, m.
+    pub base: Vec<f64>,
+    /// Weights of the column's velocities in the section's strain, for each stress node near the side; columns are rows
+    /// of the column. The section's geometry takes them over.
+    pub strain: BTreeMap<usize, Vec<(u32, VectorWeight)>>,
+    /// The same in the divergence at nodes.
+    pub divergence: BTreeMap<usize, Vec<(u32, Vec2)>>,
+}
+
+/// Rows of the column at a side, by their elevation on the undeformed lattice.
+pub struct Rows {
+    lowest: f64,
+    spacing: f64,
+    last: usize,
+}
+
+impl Rows {
+    /// Those beside a side.
+    pub fn of(section: &SectionView, hand: Hand) -> Self {
+        let side = &section.edges.sides[hand as usize];
+        let lowest = side.first().map_or(0.0, |&node| section.model.position[node].y);
+        Self { lowest, spacing: section.model.spacing.y, last: side.len().saturating_sub(1) }
+    }
+
+    fn height(&self, y: f64) -> f64 {
+        ((y - self.lowest) / self.spacing).round()
+    }
+
+    /// The row at an elevation, or the column's end for what stands higher or lower.
+    pub fn nearest(&self, y: f64) -> usize {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to the rows
+        let row = self.height(y).clamp(0.0, self.last as f64) as usize;
+        row
+    }
+
+    /// The row at an elevation, if the column has one.
+    fn at(&self, y: f64) -> Option<usize> {
+        let row = self.nearest(y);
+        (self.height(y) == row as f64).then_some(row)
+    }
+}
+
+impl SideTables {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice())
+            + size_of_val(self.base.as_slice())
+            + self.stress.bytes()
+            + self.pressure.bytes()
+    }
+
+    /// Tables of the section as it stands.
+    pub fn new(section: &SectionView, hand: Hand) -> Self {
+        match section.model.numerics.operators {
+            Operators::Conservative => Self::completed(section, hand),
+            Operators::Printed => Self::on_outermost_row(section, hand),
+        }
+    }
+
+    /// The column's traction on the outermost node of each row.
+    fn on_outermost_row(section: &SectionView, hand: Hand) -> Self {
+        let nodes = section.edges.sides[hand as usize].clone();
+        let outward = hand.normal() * section.model.spacing.y;
+        let (mut stress, mut pressure) =
+            (Csr::with_capacity(nodes.len(), 0), Csr::with_capacity(nodes.len(), 0));
+        for row in 0..nodes.len() {
+            let share = VectorWeight::plain(-outward / STRESS_NODES as f64);
+            stress.push_row(&mut [0, 1].map(|k| (id(STRESS_NODES * row + k), share)));
+            let wet = section.model.water.is_some();
+            pressure.push_row(&mut if wet { vec![(id(row), -outward)] } else { Vec::new() });
+        }
+        Self { base: vec![0.0; nodes.len()], stress, pressure, nodes, ..Self::default() }
+    }
+
+    /// Weights of stencils completed by the column beyond the side, less those of the cut ones.
+    fn completed(section: &SectionView, hand: Hand) -> Self {
+        let model = section.model;
+        let strip = Strip::new(section, hand);
+        let cut = strip.around(section, section.outline, strip.local.len());
+        let without_side = Outline { sides: [None, None], ..section.outline.clone() };
+        let whole = strip.around(section, &without_side, strip.position.len());
+        let kernel = WendlandQuintic::new(model.smoothing_length());
+        let list = |queries: &[Vec2], around: &Surroundings| {
+            NeighbourList::build(queries, &around.sources, kernel.support(), 0.0, None)
+        };
+        let stencils = |around| Stencils { around, volume: &strip.volume, kernel, period: None };
+        let (cut_stencils, whole_stencils) = (stencils(&cut), stencils(&whole));
+        let negligible = NO_DIFFERENCE / model.mean_spacing();
+
+        let mut tables = Self::default();
+        let mut stress: Vec<Vec<(u32, VectorWeight)>> = vec![Vec::new(); strip.local.len()];
+        let stress_position = stress_node_positions(&strip.position, model.spacing);
+        let (in_cut, in_whole) = (list(&stress_position, &cut), list(&stress_position, &whole));
+        for (s, &at) in stress_position.iter().enumerate() {
+            let (node, k) = (s / STRESS_NODES, s % STRESS_NODES);
+            let mut weights: BTreeMap<u32, VectorWeight> = BTreeMap::new();
+            let mut take = |stencils: &Stencils, list: &NeighbourList, sign: f64| {
+                let Some(found) = StrainRow::least_squares(stencils, &stencils.all(list, s, at)) else {
+                    return;
+                };
+                let free = found.free.iter().map(|(owner, g)| (*owner, VectorWeight::plain(g.gradient)));
+                for (owner, mut weight) in free.chain(found.walls) {
+                    weight *= sign;
+                    *weights.entry(owner).or_default() += weight;
+                }
+            };
+            take(&whole_stencils, &in_whole, 1.0);
+            if node < strip.local.len() {
+                take(&cut_stencils, &in_cut, -1.0);
+            }
+            // Seen from here the column's soil stands on both sides: nodes of its rows move as it does.
+            let near = weights.values().any(|weight| weight.magnitude() > negligible);
+            if node < strip.local.len() && near {
+                let rows =
+                    weights.iter().map(|(&owner, &weight)| (id(strip.row_or_end[owner as usize]), weight));
+                tables.strain.insert(STRESS_NODES * strip.local[node] + k, rows.collect());
+            }
+            let Some(row) = strip.row[node] else { continue };
+            for (owner, mut weight) in weights {
+                if (owner as usize) < strip.local.len() && weight.magnitude() > negligible {
+                    weight *= strip.volume[node] / STRESS_NODES as f64;
+                    stress[owner as usize].push((id(STRESS_NODES * row + k), weight));
+                }
+            }
+        }
+
+        let mut pressure: Vec<Vec<(u32, Vec2)>> = vec![Vec::new(); strip.local.len()];
+        if model.water.is_some() {
+            let (in_cut, in_whole) = (list(&strip.position, &cut), list(&strip.position, &whole));
+            for (node, &at) in strip.position.iter().enumerate() {
+                let mut weights: BTreeMap<u32, Vec2> = BTreeMap::new();
+                let mut take = |stencils: &Stencils, list: &NeighbourList, sign: f64| {
+                    for (owner, weight) in divergence_row(stencils, &stencils.all(list, node, at), id(node)) {
+                        *weights.entry(owner).or_default() += weight * sign;
+                    }
+                };
+                take(&whole_stencils, &in_whole, 1.0);
+                if node < strip.local.len() {
+                    take(&cut_stencils, &in_cut, -1.0);
+                }
+                let near = weights.values().any(|weight| weight.norm() > negligible);
+                if node < strip.local.len() && near {
+                    let rows = weights
+                        .iter()
+                        .map(|(&owner, &weight)| (id(strip.row_or_end[owner as usize]), weight));
+                    tables.divergence.insert(strip.local[node], rows.collect());
+                }
+                let Some(row) = strip.row[node] else { continue };
+                for (owner, weight) in weights {
+                    if (owner as usize) < strip.local.len() && weight.norm() > negligible {
+                        pressure[owner as usize].push((id(row), weight * strip.volume[node]));
+                    }
+                }
+            }
+        }
+
+        let base = strip.base_lengths(section, hand, kernel);
+        for (local, &node) in strip.local.iter().enumerate() {
+            if stress[local].is_empty() && pressure[local].is_empty() && base[local] == 0.0 {
+                continue;
+            }
+            tables.nodes.push(node);
+            tables.stress.push_row(&mut stress[local]);
+            tables.pressure.push_row(&mut pressure[local]);
+            tables.base.push(base[local]);
+        }
+        tables
+    }
+}
+
+/// The nodes near a side, and beyond it the column again and again, as far as stencils reach.
+struct Strip {
+    /// Nodes of the section near the side.
+    local: Vec<usize>,
+    /// Their positions, then those of the repeated column, m.
+    position: Vec<Vec2>,
+    volume: Vec<f64>,
+    /// Row of the column at the height of each; none beside a slope that stands higher.
+    row: Vec<Option<usize>>,
+    /// The same, with the column's end for what stands higher or lower.
+    row_or_end: Vec<usize>,
+}
+
+impl Strip {
+    fn new(section: &SectionView, hand: Hand) -> Self {
+        let SectionView { model, edges, position, phases, .. } = section;
+        let reach = 2.0 * WendlandQuintic::new(model.smoothing_length()).support();
+        let side = &edges.sides[hand as usize];
+        let outer =
+            side.iter().map(|&node| position[node].dot(&hand.normal())).fold(f64::NEG_INFINITY, f64::max);
+        let local: Vec<usize> = (0..position.len())
+            .filter(|&node| outer - position[node].dot(&hand.normal()) < reach + model.spacing.x)
+            .collect();
+        let rows = Rows::of(section, hand);
+        let mut strip = Self {
+            position: local.iter().map(|&node| position[node]).collect(),
+            volume: local.iter().map(|&node| phases.volume()[node]).collect(),
+            row: local.iter().map(|&node| rows.at(model.position[node].y)).collect(),
+            row_or_end: local.iter().map(|&node| rows.nearest(model.position[node].y)).collect(),
+            local,
+        };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a handful of columns
+        let repeats = (reach / model.spacing.x).ceil() as usize + 1;
+        for repeat in 1..=repeats {
+            for (row, &node) in side.iter().enumerate() {
+                strip.position.push(position[node] + hand.normal() * (repeat as f64 * model.spacing.x));
+                strip.volume.push(phases.volume()[node]);
+                strip.row.push(Some(row));
+                strip.row_or_end.push(row);
+            }
+        }
+        strip
+    }
+
+    /// The first `count` nodes and their images.
+    fn around(&self, section: &SectionView, outline: &Outline, count: usize) -> Surroundings {
+        let reach = WendlandQuintic::new(section.model.smoothing_length()).support();
+        Surroundings::new(&self.position[..count], outline, section.walls, reach)
+    }
+
+    /// Length of base, m, whose traction acts on each node of the strip through a completed trace, less that of the cut
+    /// one.
+    fn base_lengths(&self, section: &SectionView, hand: Hand, kernel: WendlandQuintic) -> Vec<f64> {
+        let mut lengths = vec![0.0; self.local.len()];
+        let Some(&corner) = section.edges.sides[hand as usize].first() else { return lengths };
+        let on_base = |node: usize| section.edges.base.contains(&node);
+        if !on_base(corner) || section.model.outline.base.is_empty() {
+            return lengths;
+        }
+        let (model, outline) = (section.model, section.outline);
+        let side_rows = section.edges.sides[hand as usize].len();
+        let lowest = self.local.iter().enumerate().filter(|(_, node)| on_base(**node)).map(|(k, _)| k);
+        let beyond = (self.local.len()..self.position.len()).step_by(side_rows.max(1));
+        let columns: Vec<usize> = lowest.chain(beyond).collect();
+        let points: Vec<Vec2> = columns
+            .iter()
+            .map(|&k| Vec2::new(self.position[k].x, outline.base_elevation(self.position[k].x)))
+            .collect();
+        for (count, sign) in [(self.position.len(), 1.0), (self.local.len(), -1.0)] {
+            let around = Surroundings::bare(&self.position[..count]);
+            let list = NeighbourList::build(&points, &around.sources, kernel.support(), 0.0, None);
+            let stencils = Stencils { around: &around, volume: &self.volume, kernel, period: None };
+            for (k, (&column, &at)) in columns.iter().zip(&points).enumerate() {
+                if column >= count {
+                    continue;
+                }
+                let members = stencils.all(&list, k, at);
+                let Ok(fit) = LeastSquaresFit::new(&members, kernel) else { continue };
+                let length = sign * model.spacing.x / -outline.base_normal(at.x).y;
+                for (k, member) in members.iter().enumerate() {
+                    if let Some(sum) = lengths.get_mut(member.owner as usize) {
+                        *sum += length * fit.value_weight(k, member);
+                    }
+                }
+            }
+        }
+        let round_off = NO_DIFFERENCE * model.mean_spacing();
+        lengths.iter().map(|length| if length.abs() > round_off { *length } else { 0.0 }).collect()
+    }
+}

@@ -1,0 +1,539 @@
+//! The ground with what acts on it: forces, accelerations, stress, and the limit of the time step.
+
+use crate::{
+    error::SolverError,
+    parallel::{Rows, chunks, for_each_chunk},
+    run::{
+        clock::{Clock, Counters},
+        forces::{ConstantForces, NodalForces, Power},
+        ground::Ground,
+        time_step::{Limits, PressureCoupling, PressureSpectrum, TimeLimit, region_limit},
+    },
+    section::{
+        description::{Model, STRESS_NODES},
+        outline::Walls,
+    },
+    skeleton::{
+        contacts::Contacts,
+        inertia::{Dispersion, lumped_masses},
+        local_damping::local_damping,
+        printed::PrintedStress,
+        rayleigh::{Rayleigh, RayleighDamping},
+        soils::{StrainStep, StressRows, StressWork},
+        strain_and_force::{NodalShare, motion},
+        viscosity::Viscosity,
+    },
+    water::still_water::suction_and_pressure,
+    weights::{
+        geometry::Geometry,
+        points::{consistent_gradient, point_weights, stress_node_positions, stress_node_values},
+    },
+};
+use sandboil_soil::Stress;
+use sandboil_sph::Vec2;
+
+/// Speed that no soil particle reaches, m/s: a run that does has diverged.
+pub const RUNAWAY_SPEED: f64 = 1e3;
+
+/// Damping of a stage.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct ActiveDamping {
+    /// Local damping `xi_l` of Eq. 16.
+    pub local: f64,
+    /// Rayleigh damping, if any.
+    pub rayleigh: Option<RayleighDamping>,
+    /// Artificial viscosity, if any.
+    pub viscosity: Option<Viscosity>,
+}
+
+/// Inertia corrected for dispersion, with the contacts of soils that it needs to see sharply.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+pub struct CorrectedInertia {
+    /// The correction.
+    pub dispersion: Dispersion,
+    /// The contacts, from the stiffness when the ground was let go.
+    pub contacts: Option<Contacts>,
+}
+
+/// Arrays that every step fills. A state holds them, since the next step reads them.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Workspace {
+    /// Share of every stress node in the nodal forces.
+    pub shares: Vec<NodalShare>,
+    /// Force of the pore water in the last step, kN/m.
+    pub water_force: Vec<Vec2>,
+    /// Stresses of the printed operators, with these.
+    pub printed: Option<PrintedStress>,
+    /// Sums over the chunks of nodes.
+    sums: Vec<MotionSum>,
+}
+
+/// Sums over nodes of the velocity update: of statics how far from rest they are, of moving ground the power of forces.
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
+pub struct MotionSum {
+    /// Kinetic energy, kJ/m.
+    pub kinetic_energy: f64,
+    /// Sum of the sizes of the accelerations, m/s2.
+    pub acceleration: f64,
+    /// The largest of them.
+    pub largest_acceleration: f64,
+    /// Power of the step's forces on the velocity between this step and the one before.
+    pub power: Power,
+    /// The same of the water's force in the step before, kW/m.
+    pub last_water_power: f64,
+}
+
+/// Ground, forces, damping, and the time.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+pub struct Domain {
+    /// The state of the section.
+    pub ground: Ground,
+    /// Constant nodal forces.
+    pub forces: ConstantForces,
+    /// Damping of the stage.
+    pub damping: ActiveDamping,
+    /// Inertia of the stage, if it is corrected.
+    pub inertia: Option<CorrectedInertia>,
+    /// Arrays of a step.
+    pub workspace: Workspace,
+    /// Spectrum of the pressure operators on the lattice.
+    spectrum: PressureSpectrum,
+    /// Time, step and time step of the stage.
+    pub clock: Clock,
+    /// Work done in the stage.
+    pub counters: Counters,
+    /// Whether loops run on several threads; the state is the same under any number.
+    #[serde(skip)]
+    pub threaded: bool,
+}
+
+impl Domain {
+    /// A section at its geostatic stress, at rest.
+    ///
+    /// # Errors
+    /// Those of [`Ground::new`].
+    pub fn new(model: &Model, threaded: bool) -> Result<Self, SolverError> {
+        let ground = Ground::new(model)?;
+        let nodes = ground.nodes();
+        let mut domain = Self {
+            forces: ConstantForces::new(nodes),
+            damping: ActiveDamping::default(),
+            inertia: None,
+            workspace: Workspace {
+                shares: vec![NodalShare::default(); ground.points.len()],
+                water_force: vec![Vec2::zeros(); nodes],
+                printed: ground.geometry.printed.as_ref().map(|_| PrintedStress::default()),
+                sums: vec![MotionSum::default(); chunks(nodes)],
+            },
+            spectrum: PressureSpectrum::new(&ground.model),
+            clock: Clock::default(),
+            counters: Counters::default(),
+            threaded,
+            ground,
+        };
+        domain.counters.porosity_clips += domain.ground.update_volumes();
+        Ok(domain)
+    }
+
+    /// Time step at `factor` of the limit of the present stiffness, s.
+    pub fn limit(&self, coupling: PressureCoupling, factor: f64) -> TimeLimit {
+        self.limit_under(self.damping.rayleigh.as_ref().map(RayleighDamping::law), coupling, factor)
+    }
+
+    /// The same under another Rayleigh damping than the stage's.
+    pub fn limit_under(
+        &self,
+        rayleigh: Option<&Rayleigh>,
+        coupling: PressureCoupling,
+        factor: f64,
+    ) -> TimeLimit {
+        let Ground { model, points, sharpness, free_surface, .. } = &self.ground;
+        let limits = Limits {
+            coupling,
+            spectrum: &self.spectrum,
+            rayleigh,
+            is_corrected: self.inertia.is_some(),
+            viscosity: self.damping.viscosity.as_ref().map_or(0.0, Viscosity::coefficient),
+            surface_is_tied: free_surface.is_none(),
+        };
+        // Nodes are sorted by region: each is one stretch.
+        let mut first = 0;
+        let TimeLimit { dt, criterion } = model
+            .region
+            .chunk_by(|a, b| a == b)
+            .map(|stretch| {
+                let rows = STRESS_NODES * first..STRESS_NODES * (first + stretch.len());
+                first += stretch.len();
+                let stiffest = points[rows].iter().fold(0.0_f64, |most, point| most.max(point.stiffness));
+                (stretch[0] as usize, stiffest)
+            })
+            .filter(|(_, stiffness)| *stiffness > 0.0)
+            .map(|(region, stiffness)| region_limit(model, region, stiffness, &limits))
+            .min_by(|a, b| a.dt.total_cmp(&b.dt))
+            .unwrap_or_default();
+        let sharper = sharpness.map_or(1.0, |sharpness| sharpness.step_factor);
+        TimeLimit { dt: factor * sharper * dt, criterion }
+    }
+
+    /// The forces of the present state.
+    pub fn nodal_forces(&self) -> NodalForces<'_> {
+        let Ground { geometry, points, phases, mass, water, .. } = &self.ground;
+        NodalForces {
+            geometry,
+            points,
+            shares: &self.workspace.shares,
+            phases,
+            mass,
+            water: water.as_ref(),
+            printed: self.workspace.printed.as_ref(),
+            rayleigh: self.damping.rayleigh.as_ref(),
+            viscosity: self.damping.viscosity.as_ref(),
+        }
+    }
+
+    fn prepare_printed_stress(&mut self) {
+        if let (Some(stress), Some(tables)) = (&mut self.workspace.printed, &self.ground.geometry.printed) {
+            stress.update(tables, &self.ground.points);
+        }
+    }
+
+    /// Force of stress and pressure alone on every node, kN/m: without the velocity filter.
+    pub fn static_force(&mut self) -> Vec<Vec2> {
+        self.refresh_shares(&vec![Vec2::zeros(); self.ground.velocity.len()]);
+        self.prepare_printed_stress();
+        let forces = self.nodal_forces();
+        (0..self.ground.nodes()).map(|j| forces.internal(j, Vec2::zeros(), forces.of_water(j))).collect()
+    }
+
+    /// Fills the shares of the stress nodes from the present stress and a velocity field.
+    fn refresh_shares(&mut self, velocity: &[Vec2]) {
+        let filter = self.ground.filter();
+        let Ground { geometry, points, .. } = &self.ground;
+        let shares = &mut self.workspace.shares;
+        for (s, share) in shares.iter_mut().enumerate() {
+            *share = motion(geometry, s, velocity).share(&points[s], geometry.covariance[s], filter);
+        }
+        if let Some(rayleigh) = &mut self.damping.rayleigh {
+            rayleigh.add_stress(false, geometry, velocity, points, shares);
+        }
+    }
+
+    /// Fills the shares of the stress nodes from the present stress and motion.
+    pub fn refresh_present_shares(&mut self) {
+        let velocity = std::mem::take(&mut self.ground.velocity);
+        self.refresh_shares(&velocity);
+        self.ground.velocity = velocity;
+    }
+
+    /// Fills the shares of the stress nodes from the present stress alone.
+    pub fn refresh_shares_at_rest(&mut self) {
+        self.refresh_shares(&vec![Vec2::zeros(); self.ground.nodes()]);
+    }
+
+    /// Makes weight and still water act where the nodes are, and nothing else.
+    pub fn set_present_forces(&mut self) {
+        let Ground { model, water, position, phases, .. } = &self.ground;
+        let volume = phases.volume();
+        let mut parts = Vec::new();
+        if let Some(buoyancy) = water.as_ref().and_then(|flow| flow.buoyancy(position, volume)) {
+            parts.push(buoyancy);
+        } else if model.water.is_some() {
+            let (suction, pressure) = suction_and_pressure(model);
+            let gradient = consistent_gradient(model, position, volume, &pressure);
+            let of_pressure = gradient.iter().zip(volume).map(|(gradient, volume)| -(gradient * *volume));
+            let of_pressure: Vec<Vec2> = of_pressure.collect();
+            if suction.iter().any(|p| *p < 0.0) {
+                parts.push(self.suction_force(&suction));
+            }
+            parts.push(of_pressure);
+        }
+        self.forces.set_present(&self.ground.mass, self.ground.model.gravity, &parts);
+    }
+
+    /// Force of suction (kPa, negative) on every node, kN/m. Water under pressure continues as a pond beyond the ground
+    /// surface, so that its gradient is all its force; suction ends there, and draws the surface to the ground: it acts
+    /// as the stress that it is a part of, which no traction meets at the surface.
+    fn suction_force(&mut self, suction: &[f64]) -> Vec<Vec2> {
+        let Ground { model, position, points, .. } = &mut self.ground;
+        let places = stress_node_positions(position, model.spacing);
+        let weights = point_weights(model, position, &places);
+        let kept: Vec<Stress> = points.iter().map(|point| point.stress).collect();
+        for (s, point) in points.iter_mut().enumerate() {
+            let pull = -weights.iter_row(s).map(|(node, w)| w * suction[node]).sum::<f64>();
+            point.stress = Stress { xx: pull, yy: pull, zz: pull, xy: 0.0 };
+        }
+        let force = self.static_force();
+        for (point, stress) in self.ground.points.iter_mut().zip(kept) {
+            point.stress = stress;
+        }
+        force
+    }
+
+    /// Makes the present state one of rest: constant forces balance stress and pressure.
+    pub fn balance(&mut self) {
+        let force = self.static_force();
+        self.forces.balance(&force);
+    }
+
+    /// Makes the present excess pressure one that a constant load holds. The load also acts on the nodes tied to the
+    /// surface, whose pressure drains at once.
+    pub fn balance_under_load(&mut self) {
+        let force = self.static_force();
+        let Ground { water, geometry, .. } = &self.ground;
+        let held_back = |j: usize| match (water, &geometry.flow, &geometry.printed) {
+            (Some(flow), Some(tables), None) => flow.held_back(tables, j),
+            _ => Vec2::zeros(),
+        };
+        self.forces.balance_under_load(&force, held_back);
+    }
+
+    /// Forces and accelerations, and velocities changed by them over `dt`; positions stay. Returns what is needed of the
+    /// motion in statics or else.
+    pub fn accelerate<const STATICS: bool>(&mut self, dt: f64) -> MotionSum {
+        self.prepare_printed_stress();
+        let threaded = self.threaded;
+        let Self { ground, forces: constant, damping, inertia, workspace, .. } = self;
+        let Ground { model, velocity, acceleration, geometry, points, phases, mass, water, .. } = ground;
+        let Workspace { shares, water_force, printed, sums } = workspace;
+        let (nodes, is_wet) = (model.nodes(), water.is_some());
+        let forces = NodalForces {
+            geometry,
+            points,
+            shares,
+            phases,
+            mass,
+            water: water.as_ref(),
+            printed: printed.as_ref(),
+            rayleigh: damping.rayleigh.as_ref(),
+            viscosity: damping.viscosity.as_ref(),
+        };
+        // The constant force comes last, so that a state at rest cancels to the last bit.
+        let bare = |j: usize, velocity: Vec2, water: &mut Vec2, sum: &mut MotionSum| {
+            let last_water = *water;
+            *water = forces.of_water(j);
+            if !STATICS {
+                constant.add_power(j, mass[j], velocity, model.gravity, &mut sum.power);
+                if is_wet {
+                    sum.power.water += water.dot(&velocity);
+                    sum.last_water_power += last_water.dot(&velocity);
+                }
+            }
+            (forces.internal(j, velocity, *water) + constant.total(j)) / mass[j]
+        };
+        sums.fill(MotionSum::default());
+        let mut dispersion = inertia.as_mut().map(|inertia| &mut inertia.dispersion);
+        if let Some(dispersion) = &mut dispersion {
+            let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: water_force };
+            for_each_chunk(threaded, rows, sums, |first, rows, sum| {
+                for (k, (v, a)) in rows.a.iter().zip(rows.b.iter_mut()).enumerate() {
+                    *a = bare(first + k, *v, &mut rows.c[k], sum);
+                }
+            });
+            dispersion.gather(threaded, geometry, points, acceleration);
+        }
+        let dispersion = dispersion.as_deref();
+        let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: water_force };
+        for_each_chunk(threaded, rows, sums, |first, rows, chunk| {
+            // In registers: memory that the loop may write elsewhere would be read back every time.
+            let mut sum = *chunk;
+            for (k, (v, a)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
+                let j = first + k;
+                let acting = match dispersion {
+                    None => bare(j, *v, &mut rows.c[k], &mut sum),
+                    Some(dispersion) => *a + dispersion.acceleration(geometry, j, mass[j]),
+                };
+                *a = acting;
+                *v += acting * dt;
+                if STATICS {
+                    let size = acting.norm();
+                    sum.kinetic_energy += 0.5 * mass[j] * v.norm_squared();
+                    sum.acceleration += size;
+                    sum.largest_acceleration = sum.largest_acceleration.max(size);
+                }
+            }
+            *chunk = sum;
+        });
+        // In order, whichever thread made them.
+        let total = sums.iter().fold(MotionSum::default(), |total, chunk| MotionSum {
+            kinetic_energy: total.kinetic_energy + chunk.kinetic_energy,
+            acceleration: total.acceleration + chunk.acceleration,
+            largest_acceleration: total.largest_acceleration.max(chunk.largest_acceleration),
+            power: total.power.plus(&chunk.power),
+            last_water_power: total.last_water_power + chunk.last_water_power,
+        });
+        self.counters.inertia_corrections += u64::from(self.inertia.is_some());
+        total
+    }
+
+    /// Power of the last step's forces on the present velocities.
+    pub fn present_power(&self) -> Power {
+        let Ground { model, velocity, mass, .. } = &self.ground;
+        let mut power = Power::default();
+        for (j, (v, mass)) in velocity.iter().zip(mass).enumerate() {
+            self.forces.add_power(j, *mass, *v, model.gravity, &mut power);
+            power.water += self.workspace.water_force[j].dot(v);
+        }
+        power
+    }
+
+    /// Local damping of Eq. 16 on the whole acceleration, the base's tractions included, against the velocity that
+    /// each node had before it. Returns the energy taken, kJ/m.
+    pub fn damp_locally(&mut self, dt: f64) -> f64 {
+        let coefficient = self.damping.local;
+        if coefficient == 0.0 {
+            return 0.0;
+        }
+        let Ground { velocity, acceleration, mass, .. } = &mut self.ground;
+        let mut taken = 0.0;
+        // The copies behind the nodes have no mass here.
+        let masses = mass.iter().chain(std::iter::repeat(&0.0));
+        for ((v, a), mass) in velocity.iter_mut().zip(acceleration).zip(masses) {
+            let before = *v - *a * dt;
+            let drag = local_damping(*a, before, coefficient);
+            *v += drag * dt;
+            *a += drag;
+            taken -= mass * drag.dot(&(before + *v)) * (0.5 * dt);
+        }
+        taken
+    }
+
+    /// Gathers the artificial viscosity of the present motion, if the stage has one.
+    pub fn update_viscosity(&mut self) {
+        let Some(viscosity) = &mut self.damping.viscosity else { return };
+        let Ground { model, geometry, points, position, velocity, phases, .. } = &self.ground;
+        viscosity.update(self.threaded, (model, geometry), points, (position, velocity, phases.volume()));
+    }
+
+    /// Strain, soil model and the shares of the next force loop, from the velocity at mid-step.
+    ///
+    /// # Errors
+    /// [`SolverError::Diverged`] or [`SolverError::Soil`].
+    pub fn update_stress(&mut self, dt: f64, with_after: bool) -> Result<StressWork, SolverError> {
+        let filter = self.ground.filter();
+        let Ground { model, soil, geometry, velocity, points, .. } = &mut self.ground;
+        let integrator = &model.numerics.integrator;
+        let step = StrainStep { geometry, velocity, filter, dt, integrator, with_after };
+        let report =
+            soil.step(self.threaded, &step, StressRows { points, shares: &mut self.workspace.shares });
+        let (report, work) = report.map_err(|error| match error.soil_divergence() {
+            Some((quantity, node, value)) => self.diverged(quantity, node, value),
+            None => error,
+        })?;
+        let Ground { geometry, velocity, points, .. } = &self.ground;
+        if let Some(rayleigh) = &mut self.damping.rayleigh {
+            rayleigh.add_stress(self.threaded, geometry, velocity, points, &mut self.workspace.shares);
+        }
+        self.counters.soil.merge(&report);
+        self.counters.plastic_updates += self.ground.soil.plastic_points() as u64;
+        self.counters.steps += 1;
+        Ok(work)
+    }
+
+    /// Advances pore pressure by a step from the motion at its middle.
+    ///
+    /// # Errors
+    /// [`SolverError::Diverged`] if the matrix of implicit diffusion is not finite.
+    pub fn update_water(&mut self, dt: f64) -> Result<(), SolverError> {
+        let Ground { water, geometry, points, velocity, acceleration, .. } = &mut self.ground;
+        let (Some(flow), Some(tables)) = (water, &geometry.flow) else { return Ok(()) };
+        self.counters.flow_calls += 1;
+        let times = (self.clock.time + dt, dt);
+        if flow.step(self.threaded, tables, points, (velocity, acceleration), times) {
+            Ok(())
+        } else {
+            Err(self.diverged("pore pressure matrix", 0, f64::NAN))
+        }
+    }
+
+    /// Moves the nodes by a step, and the pressure that counts as no excess with them.
+    pub fn move_nodes(&mut self, dt: f64) {
+        let Ground { position, velocity, water, .. } = &mut self.ground;
+        for (x, v) in position.iter_mut().zip(velocity) {
+            *x += *v * dt;
+        }
+        if let Some(flow) = water {
+            flow.carry(position);
+        }
+    }
+
+    /// Builds the weights at the present place, with volumes, masses and water.
+    pub fn rebuild_geometry(&mut self) {
+        // The tables are replaced as a whole; the lists of the old ones serve while no node left their skin.
+        let previous = self.ground.geometry.clone();
+        self.counters.porosity_clips += self.ground.update_volumes();
+        let outline = self.ground.outline();
+        let Ground { model, position, phases, walls, .. } = &self.ground;
+        self.ground.geometry =
+            Geometry::build(model, position, phases.volume(), (&outline, *walls), Some(previous));
+        self.ground.update_surroundings(self.threaded);
+        let time = self.clock.time;
+        self.ground.with_water(&outline, |flow, section| flow.follow(section, time));
+        self.counters.geometry_builds += 1;
+        self.sharpen_contacts();
+    }
+
+    /// Sets how edges act, and renews the geometry if that changes.
+    pub fn set_walls(&mut self, walls: Walls) {
+        if walls != self.ground.walls {
+            self.ground.walls = walls;
+            self.rebuild_geometry();
+        }
+    }
+
+    /// With corrected inertia: strain with its kinks at contacts, and the masses that the operators give beside contacts and
+    /// edges.
+    pub fn sharpen_contacts(&mut self) {
+        let Some(CorrectedInertia { contacts: Some(contacts), .. }) = &self.inertia else { return };
+        let outline = self.ground.outline();
+        let Ground { model, position, points, geometry, mass, walls, .. } = &mut self.ground;
+        let value = stress_node_values(model, position, (&outline, *walls));
+        *mass = lumped_masses(&value, points, model.nodes());
+        contacts.sharpen(model, position, points, &value, (geometry, mass.as_mut_slice()));
+    }
+
+    /// Refuses motion and pore pressure that are no longer finite, and motion that runs away. Strain and stress are
+    /// refused by the soil models, or show in the next step's motion.
+    ///
+    /// # Errors
+    /// [`SolverError::Diverged`] with the first node found.
+    pub fn guard(&self) -> Result<(), SolverError> {
+        self.check_finite("velocity", |ground, j| ground.velocity[j].norm(), RUNAWAY_SPEED)?;
+        match &self.ground.water {
+            Some(flow) => self.check_finite("pore pressure", |_, j| flow.excess(j).abs(), f64::INFINITY),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses a quantity that exceeds its bound or is not finite at some node.
+    ///
+    /// # Errors
+    /// [`SolverError::Diverged`] with the first node found.
+    pub fn check_finite(
+        &self,
+        quantity: &'static str,
+        value: impl Fn(&Ground, usize) -> f64,
+        bound: f64,
+    ) -> Result<(), SolverError> {
+        for j in 0..self.ground.nodes() {
+            let found = value(&self.ground, j);
+            // NaN must take the error branch.
+            if !(found <= bound) || found == f64::INFINITY {
+                return Err(self.diverged(quantity, j, found));
+            }
+        }
+        Ok(())
+    }
+
+    fn diverged(&self, quantity: &'static str, j: usize, value: f64) -> SolverError {
+        let Ground { order, position, .. } = &self.ground;
+        SolverError::Diverged {
+            quantity,
+            node: order[j],
+            x: position[j].x,
+            y: position[j].y,
+            value,
+            time: self.clock.time,
+            step: self.clock.step,
+        }
+    }
+}

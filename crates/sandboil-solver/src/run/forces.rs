@@ -1,0 +1,198 @@
+//! Forces on the velocity nodes: the constant ones by their origin, and those of stress, water and damping.
+
+use crate::{
+    skeleton::{
+        phases::Phases,
+        point::StressPoint,
+        printed::PrintedStress,
+        rayleigh::RayleighDamping,
+        strain_and_force::{NodalShare, conservative_force},
+        viscosity::Viscosity,
+    },
+    water::pore_pressure::Flow,
+    weights::geometry::Geometry,
+};
+use sandboil_sph::Vec2;
+
+/// Constant nodal forces, kN/m. What a scene does not have takes no memory.
+///
+/// In a stage of small displacements the sum is what balances the state at its start to the last bit; the part that is
+/// neither weight, still water, renewal nor load is the reaction: of the edges, and of whatever the statics left over.
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
+pub struct ConstantForces {
+    /// Sum of all parts.
+    total: Vec<Vec2>,
+    /// Of still water, whose pressure is that at rest or at the present place.
+    still_water: Vec<Vec2>,
+    /// Balance of what renewed weights make of the present stress.
+    renewal: Vec<Vec2>,
+    /// Of a load that holds an excess pore pressure.
+    load: Vec<Vec2>,
+}
+
+/// Power of nodal forces on a velocity field, by origin, kW/m.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Power {
+    /// Of all constant forces.
+    pub constant: f64,
+    /// Of weight.
+    pub weight: f64,
+    /// Of still water.
+    pub still_water: f64,
+    /// Of the balance at renewals.
+    pub renewal: f64,
+    /// Of a load.
+    pub load: f64,
+    /// Of the pore water beyond its state at rest.
+    pub water: f64,
+}
+
+impl Power {
+    /// The sum of two.
+    #[must_use]
+    pub fn plus(self, other: &Self) -> Self {
+        Self {
+            constant: self.constant + other.constant,
+            weight: self.weight + other.weight,
+            still_water: self.still_water + other.still_water,
+            renewal: self.renewal + other.renewal,
+            load: self.load + other.load,
+            water: self.water + other.water,
+        }
+    }
+}
+
+impl ConstantForces {
+    /// None yet, on so many nodes.
+    pub fn new(nodes: usize) -> Self {
+        Self { total: vec![Vec2::zeros(); nodes], ..Self::default() }
+    }
+
+    /// Sum on node `j`, kN/m.
+    #[inline]
+    pub fn total(&self, j: usize) -> Vec2 {
+        self.total[j]
+    }
+
+    /// Adds the power of the constant forces on node `j`, of a mass (Mg/m) that moves at a velocity (m/s), under `gravity`
+    /// (m/s2).
+    #[inline]
+    pub fn add_power(&self, j: usize, mass: f64, velocity: Vec2, gravity: f64, power: &mut Power) {
+        power.constant += self.total[j].dot(&velocity);
+        power.weight -= gravity * mass * velocity.y;
+        for (part, sum) in [
+            (&self.still_water, &mut power.still_water),
+            (&self.renewal, &mut power.renewal),
+            (&self.load, &mut power.load),
+        ] {
+            if let Some(force) = part.get(j) {
+                *sum += force.dot(&velocity);
+            }
+        }
+    }
+
+    /// Weight and still water alone, each where the nodes are: `still_water` is the sequence of its contributions.
+    pub fn set_present(&mut self, mass: &[f64], gravity: f64, still_water: &[Vec<Vec2>]) {
+        let gravity = Vec2::new(0.0, -gravity);
+        self.total.clear();
+        self.total.extend(mass.iter().map(|mass| gravity * *mass));
+        (self.renewal, self.load) = (Vec::new(), Vec::new());
+        self.still_water = vec![Vec2::zeros(); if still_water.is_empty() { 0 } else { mass.len() }];
+        for part in still_water {
+            self.total.iter_mut().zip(part).for_each(|(sum, force)| *sum += force);
+            self.still_water.iter_mut().zip(part).for_each(|(sum, force)| *sum += force);
+        }
+    }
+
+    /// Makes a state one of rest: the sum balances `force` (kN/m), that of stress and pressure.
+    pub fn balance(&mut self, force: &[Vec2]) {
+        self.total.clear();
+        self.total.extend(force.iter().map(|force| -force));
+        (self.renewal, self.load) = (Vec::new(), Vec::new());
+    }
+
+    /// Makes a state one of rest under a load: the sum balances `force` less what is `held_back` from it (kN/m), and its
+    /// change is the load.
+    pub fn balance_under_load(&mut self, force: &[Vec2], held_back: impl Fn(usize) -> Vec2) {
+        let before = self.total.clone();
+        self.balance(force);
+        for (j, total) in self.total.iter_mut().enumerate() {
+            *total -= held_back(j);
+        }
+        self.load = self.total.iter().zip(before).map(|(now, before)| now - before).collect();
+    }
+
+    /// Keeps a state in balance whose force of stress and pressure a renewal of the geometry has changed, kN/m.
+    pub fn carry_over(&mut self, before: &[Vec2], after: &[Vec2]) {
+        self.renewal.resize(self.total.len(), Vec2::zeros());
+        for (j, (before, after)) in before.iter().zip(after).enumerate() {
+            let change = before - after;
+            self.total[j] += change;
+            self.renewal[j] += change;
+        }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        [&self.total, &self.still_water, &self.renewal, &self.load]
+            .map(|part| size_of_val(part.as_slice()))
+            .iter()
+            .sum()
+    }
+}
+
+/// What acts on the nodes by the present state.
+#[derive(Clone, Copy)]
+pub struct NodalForces<'a> {
+    /// Weights.
+    pub geometry: &'a Geometry,
+    /// Stress nodes.
+    pub points: &'a [StressPoint],
+    /// Their shares in the forces.
+    pub shares: &'a [NodalShare],
+    /// Volumes and densities.
+    pub phases: &'a Phases,
+    /// Mass of each node, Mg/m.
+    pub mass: &'a [f64],
+    /// Pore water.
+    pub water: Option<&'a Flow>,
+    /// Stresses of the printed operators.
+    pub printed: Option<&'a PrintedStress>,
+    /// Rayleigh damping.
+    pub rayleigh: Option<&'a RayleighDamping>,
+    /// Artificial viscosity.
+    pub viscosity: Option<&'a Viscosity>,
+}
+
+impl NodalForces<'_> {
+    /// Force of the excess pore pressure on node `j` (Eq. 6), kN/m.
+    #[inline]
+    pub fn of_water(&self, j: usize) -> Vec2 {
+        let (Some(flow), Some(tables)) = (self.water, &self.geometry.flow) else { return Vec2::zeros() };
+        match &self.geometry.printed {
+            None => flow.force(tables, j),
+            Some(printed) => {
+                let row = printed.pressure_gradient.iter_row(j);
+                let gradient: Vec2 = row.map(|(i, gradient)| gradient * flow.neutral(i)).sum();
+                gradient * -self.phases.volume()[j]
+            }
+        }
+    }
+
+    /// Force on node `j`, moving at `velocity`, of stress and damping, and of excess pore pressure, `water` (Eq. 6), kN/m.
+    #[inline]
+    pub fn internal(&self, j: usize, velocity: Vec2, water: Vec2) -> Vec2 {
+        let mut force = match (self.printed, &self.geometry.printed) {
+            (Some(stress), Some(tables)) => stress.force(tables, j, self.points, self.phases),
+            _ => conservative_force(self.geometry, j, velocity, self.shares, self.points),
+        };
+        force += water;
+        if let Some(viscosity) = self.viscosity {
+            force += viscosity.force(j);
+        }
+        if let Some(rayleigh) = self.rayleigh {
+            force += rayleigh.force(self.geometry, j, self.mass[j], velocity);
+        }
+        force
+    }
+}

@@ -1,0 +1,308 @@
+//! The state of a section: where the ground is, how it moves, and what soil and water carry.
+
+use crate::{
+    edges::base::{Base, Impedance},
+    error::SolverError,
+    section::{
+        description::{Model, Region, STRESS_NODES},
+        edge_nodes::EdgeNodes,
+        order::sorted,
+        outline::{Outline, Walls},
+    },
+    skeleton::{
+        deformation::Deformation, phases::Phases, point::StressPoint, section_view::SectionView,
+        soils::SoilField,
+    },
+    water::pore_pressure::Flow,
+    weights::{
+        free_surface::free_surface,
+        geometry::Geometry,
+        points::{point_weights, stress_node_positions},
+    },
+};
+use sandboil_soil::Stress;
+use sandboil_sph::Vec2;
+
+/// Where base and sides are.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+pub enum Placement {
+    /// Where they were drawn.
+    Drawn,
+    /// With the nodes along them, from these places (m), as far as the edges are free.
+    WithNodes(Vec<Vec2>),
+    /// Held where they were when a stage began.
+    Held(Outline),
+}
+
+/// What large displacements need to know of the weights.
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
+pub struct Sharpness {
+    /// Sharpness of the weights of the lattice, 1/m2, for which the limits of the time step hold.
+    lattice: [f64; 2],
+    /// Factor on those limits where nodes have come closer than in the lattice.
+    pub step_factor: f64,
+}
+
+impl Sharpness {
+    /// That of the lattice of a model.
+    pub fn new(model: &Model) -> Self {
+        let Model { position, volume, outline, .. } = model;
+        let edges = (outline, Walls::statics(outline));
+        let lattice = Geometry::build(model, position, volume, edges, None).sharpness(volume);
+        Self { lattice, step_factor: 1.0 }
+    }
+
+    /// Takes over weights of another sharpness, 1/m2.
+    pub fn update(&mut self, sharpness: [f64; 2]) {
+        let squared = |(now, lattice): (f64, f64)| if lattice > 0.0 { now / lattice } else { 1.0 };
+        let sharper = sharpness.into_iter().zip(self.lattice).map(squared).fold(1.0, f64::max);
+        self.step_factor = sharper.sqrt().recip();
+    }
+}
+
+/// A section and its state. Nodes are sorted by region, row and column.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+pub struct Ground {
+    /// The section; its positions are the initial ones.
+    pub model: Model,
+    /// User's index of each node.
+    pub order: Vec<usize>,
+    /// Nodes along the edges.
+    pub edges: EdgeNodes,
+    /// How the edges act.
+    pub walls: Walls,
+    /// Where the edges are.
+    pub placement: Placement,
+    /// Present places of the nodes, m.
+    pub position: Vec<Vec2>,
+    /// Velocities of the nodes, m/s, followed by the copies of a neighbour's.
+    pub velocity: Vec<Vec2>,
+    /// Accelerations likewise, m/s2.
+    pub acceleration: Vec<Vec2>,
+    /// Volumes, porosities and densities.
+    pub phases: Phases,
+    /// Mass of each node, Mg/m.
+    pub mass: Vec<f64>,
+    /// Stress nodes.
+    pub points: Vec<StressPoint>,
+    /// Soil models of the stress nodes.
+    pub soil: SoilField,
+    /// Pore pressure, once the ground moves.
+    pub water: Option<Flow>,
+    /// Weights at the present place.
+    pub geometry: Geometry,
+    /// Sharpness of the weights, with large displacements.
+    pub sharpness: Option<Sharpness>,
+    /// Outward normals of the nodes at the free surface, where it is found; empty in a dry section.
+    pub free_surface: Option<Vec<Option<Vec2>>>,
+}
+
+impl Ground {
+    /// The section at its geostatic stress, at rest on held edges.
+    ///
+    /// # Errors
+    /// Bad input, or elastic constants outside their range.
+    pub fn new(model: &Model) -> Result<Self, SolverError> {
+        model.validate()?;
+        let (model, order) = sorted(model);
+        let nodes = model.nodes();
+        let phases = Phases::new(&model);
+        let walls = Walls::statics(&model.outline);
+        let geometry =
+            Geometry::build(&model, &model.position, phases.volume(), (&model.outline, walls), None);
+        let mut points: Vec<StressPoint> = (0..STRESS_NODES * nodes)
+            .map(|s| {
+                let Region { earth_pressure_coefficient, .. } =
+                    model.regions[model.region[s / STRESS_NODES] as usize];
+                let vertical = -model.vertical_effective_stress[s];
+                let lateral = earth_pressure_coefficient * vertical;
+                let stress = Stress { xx: lateral, yy: vertical, xy: 0.0, zz: lateral };
+                StressPoint { stress, ..StressPoint::default() }
+            })
+            .collect();
+        let soil = SoilField::elastic(&model, &mut points)?;
+        Ok(Self {
+            order,
+            edges: EdgeNodes::new(&model),
+            walls,
+            placement: Placement::Drawn,
+            position: model.position.clone(),
+            velocity: vec![Vec2::zeros(); nodes],
+            acceleration: vec![Vec2::zeros(); nodes],
+            mass: vec![0.0; nodes],
+            points,
+            soil,
+            water: None,
+            geometry,
+            sharpness: None,
+            free_surface: None,
+            phases,
+            model,
+        })
+    }
+
+    /// Number of nodes.
+    pub fn nodes(&self) -> usize {
+        self.model.nodes()
+    }
+
+    /// Strength `xi / dx` of the velocity filter, 1/m.
+    pub fn filter(&self) -> f64 {
+        self.model.numerics.velocity_filter / self.model.mean_spacing()
+    }
+
+    /// Kinetic energy, kJ/m.
+    pub fn kinetic_energy(&self) -> f64 {
+        self.mass.iter().zip(&self.velocity).map(|(mass, v)| 0.5 * mass * v.norm_squared()).sum()
+    }
+
+    /// The edges where they are: those that are free go with the mean of the nodes along them.
+    pub fn outline(&self) -> Outline {
+        let from = match &self.placement {
+            Placement::Drawn => return self.model.outline.clone(),
+            Placement::Held(outline) => return outline.clone(),
+            Placement::WithNodes(from) => from,
+        };
+        let moved = |nodes: &[usize], free: [bool; 2]| {
+            let total: Vec2 = nodes.iter().map(|&node| self.position[node] - from[node]).sum();
+            let mean = total / nodes.len().max(1) as f64;
+            Vec2::new(if free[0] { mean.x } else { 0.0 }, if free[1] { mean.y } else { 0.0 })
+        };
+        let sides = [0, 1].map(|k| moved(&self.edges.sides[k], self.walls.sides[k].leaves_free()));
+        self.model.outline.moved(moved(&self.edges.base, self.walls.base.leaves_free()), sides)
+    }
+
+    /// The section as it stands, with its edges.
+    pub fn view<'a>(&'a self, outline: &'a Outline) -> SectionView<'a> {
+        SectionView {
+            model: &self.model,
+            outline,
+            walls: self.walls,
+            edges: &self.edges,
+            position: &self.position,
+            phases: &self.phases,
+            mass: &self.mass,
+            geometry: &self.geometry,
+            free_surface: self.free_surface.as_deref(),
+        }
+    }
+
+    /// Updates the pore water with the section as it stands.
+    pub fn with_water(&mut self, outline: &Outline, update: impl FnOnce(&mut Flow, SectionView)) {
+        let Some(mut water) = self.water.take() else { return };
+        update(&mut water, self.view(outline));
+        self.water = Some(water);
+    }
+
+    /// Makes room behind the nodes for copies of a neighbour's motion.
+    pub fn resize_copies(&mut self, copies: usize) {
+        for motion in [&mut self.velocity, &mut self.acceleration] {
+            motion.resize(self.model.nodes() + copies, Vec2::zeros());
+        }
+    }
+
+    /// Volumes, densities and masses of the present strain, from which deformation starts again. Returns how many
+    /// porosities had to be kept in their range.
+    pub fn update_volumes(&mut self) -> u64 {
+        let clips = self.phases.follow(&self.points);
+        for (node, mass) in self.mass.iter_mut().enumerate() {
+            *mass = self.phases.mass(node);
+            let volume = self.phases.volume()[node];
+            for point in &mut self.points[STRESS_NODES * node..STRESS_NODES * (node + 1)] {
+                point.density = *mass / volume;
+                point.volume = volume / STRESS_NODES as f64;
+                point.deformation = Deformation::default();
+            }
+        }
+        clips
+    }
+
+    /// Updates what depends on renewed weights with large displacements: their sharpness, and the free surface if water
+    /// crosses it.
+    pub fn update_surroundings(&mut self, threaded: bool) {
+        let volume = self.phases.volume();
+        if let Some(sharpness) = &mut self.sharpness {
+            sharpness.update(self.geometry.sharpness(volume));
+        }
+        if self.free_surface.is_some() && self.model.water.is_some() {
+            let outline = self.outline();
+            let edges = (&outline, self.walls);
+            self.free_surface = Some(free_surface(threaded, &self.model, &self.position, volume, edges));
+        }
+    }
+
+    /// Whether some stress node is strained beyond the range of its weights, or with large displacements a node has left its
+    /// list.
+    pub fn is_strained(&self) -> bool {
+        let limit = self.model.numerics.geometry_strain_limit();
+        if self.sharpness.is_some() && self.geometry.lists().are_left(&self.model, &self.position) {
+            return true;
+        }
+        self.points.iter().any(|point| point.deformation.magnitude() > limit)
+    }
+
+    /// Starts strains, which count from the start of a stage.
+    pub fn restart_strain(&mut self) {
+        self.phases.restart_strain();
+        for point in &mut self.points {
+            point.strain = [0.0; 3];
+        }
+    }
+
+    /// The half-space below each base point: as given, or of the layer above it, with the model's small-strain moduli at
+    /// the base's stress.
+    ///
+    /// # Errors
+    /// Soil that refuses its stress.
+    pub fn base_impedance(&self, base: &Base) -> Result<Vec<Impedance>, SolverError> {
+        let points = self.edges.base_points(&self.model, &self.position);
+        let stress_position = stress_node_positions(&self.position, self.model.spacing);
+        let weights = point_weights(&self.model, &stress_position, &points);
+        self.edges
+            .base
+            .iter()
+            .enumerate()
+            .map(|(point, &node)| {
+                let at_base = |component: &dyn Fn(&Stress) -> f64| -> f64 {
+                    weights.iter_row(point).map(|(s, w)| w * component(&self.points[s].stress)).sum()
+                };
+                let stress = Stress {
+                    xx: at_base(&|s| s.xx),
+                    yy: at_base(&|s| s.yy),
+                    xy: at_base(&|s| s.xy),
+                    zz: at_base(&|s| s.zz),
+                };
+                let Some(given) = base.half_space else { return self.impedance_at(node, stress) };
+                // Without a compression-wave speed nothing needs one: a level roller base.
+                let compression_speed = given.compression_speed.unwrap_or(given.shear_speed);
+                Ok(Impedance { density: given.density, shear_speed: given.shear_speed, compression_speed })
+            })
+            .collect()
+    }
+
+    /// Density and small-strain wave speeds of the soil of a node at a stress; the compression wave's undrained.
+    ///
+    /// # Errors
+    /// Soil that refuses the stress.
+    pub fn impedance_at(&self, node: usize, stress: Stress) -> Result<Impedance, SolverError> {
+        let region = self.model.region[node] as usize;
+        let density = self.model.mixture_density(region);
+        let moduli = self.model.regions[region].soil.small_strain_moduli(stress);
+        let moduli = moduli.map_err(|source| SolverError::Soil { region, node, source })?;
+        let water = self.model.water_stiffness(self.model.regions[region].porosity);
+        Ok(Impedance {
+            density,
+            shear_speed: (moduli.shear / density).sqrt(),
+            compression_speed: ((moduli.bulk + 4.0 / 3.0 * moduli.shear + water) / density).sqrt(),
+        })
+    }
+
+    /// Values of the nodes in the user's order.
+    pub fn in_user_order<T: Copy + Default>(&self, value: impl Fn(usize) -> T) -> Vec<T> {
+        let mut out = vec![T::default(); self.model.nodes()];
+        for (j, &user) in self.order.iter().enumerate() {
+            out[user] = value(j);
+        }
+        out
+    }
+}

@@ -1,0 +1,37 @@
+//! Largest values of every node in a stage.
+
+use crate::{run::ground::Ground, skeleton::point::maximum_shear_strain, stages::stage::Output};
+
+/// Envelopes of a stage; every step counts.
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+pub struct Envelopes {
+    /// Largest excess pore pressure of every node, kPa, if it is kept.
+    pub pressure: Option<Vec<f64>>,
+    /// Largest engineering shear strain of every stress node, if it is kept.
+    pub strain: Option<Vec<f64>>,
+}
+
+impl Envelopes {
+    /// Those that a stage asks for.
+    pub fn new(ground: &Ground, output: &Output) -> Self {
+        let is_wet = ground.water.is_some();
+        Self {
+            pressure: (output.pressure_envelope && is_wet).then(|| vec![0.0; ground.nodes()]),
+            strain: output.strain_envelope.then(|| vec![0.0; ground.points.len()]),
+        }
+    }
+
+    /// Takes over the present values.
+    pub fn record(&mut self, ground: &Ground) {
+        if let (Some(envelope), Some(flow)) = (&mut self.pressure, &ground.water) {
+            for (node, largest) in envelope.iter_mut().enumerate() {
+                *largest = largest.max(flow.excess(node));
+            }
+        }
+        if let Some(envelope) = &mut self.strain {
+            for (largest, point) in envelope.iter_mut().zip(&ground.points) {
+                *largest = largest.max(maximum_shear_strain(point.strain));
+            }
+        }
+    }
+}
