@@ -688,7 +688,7 @@ def test_record_with_the_older_header_format() -> None:
 
 @needs_record
 def test_spectrum_of_the_record_is_the_reference_one() -> None:
-    path = Path(__file__).parent / "validation" / "data" / "level_ground" / "spectrum.csv"
+    path = Path(__file__).parents[1] / "validation" / "level_ground" / "reference" / "spectrum.csv"
     reference = np.loadtxt(path, delimiter=",", skiprows=1)
     spectrum = Motion.from_at2(RECORD).response_spectrum(periods=reference[:, 0])
     np.testing.assert_allclose(spectrum.psa_g, reference[:, 2], rtol=3e-6)

@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 FILE_NAME = "free_field.h5"
 
 # Time between the frames kept, s: straight lines between them lose 0.1 % of a pulse of 5 Hz
-# (docs/validation.md).
+# (validation/README.md).
 INTERVAL = 0.0025
 
 HANDS = ("left", "right")

@@ -130,7 +130,7 @@ class Plan:
         lines += [
             "",
             f"accuracy      {self.accuracy}; what presets save and cost is measured on the level ground,",
-            "              see docs/validation.md",
+            "              see validation/README.md",
         ]
         if self.doubts:
             lines += ["", *(f"warning: {doubt}" for doubt in self.doubts)]
