@@ -19,7 +19,7 @@ out := out/level_ground
 demo: $(VENV)
 	$(bin)/pip install --quiet "$(PACKAGE)"
 	$(bin)/sandboil plan $(scene)
-	$(bin)/sandboil run $(scene) --out $(out)
+	$(bin)/sandboil run $(scene) --out $(out) --resume
 	$(bin)/sandboil plot $(out)
 	@echo "The pictures are in $(out)/plots"
 
