@@ -16,17 +16,17 @@ out := out/level_ground
 
 .PHONY: demo test
 
-demo: $(VENV)
+demo: $(VENV)/bin/pip
 	$(bin)/pip install --quiet "$(PACKAGE)"
 	$(bin)/sandboil plan $(scene)
-	$(bin)/sandboil run $(scene) --out $(out) --resume
+	$(bin)/sandboil run $(scene) --out $(out) $(if $(wildcard $(out)/results.h5),--resume)
 	$(bin)/sandboil plot $(out)
 	@echo "The pictures are in $(out)/plots"
 
-test: $(VENV)
+test: $(VENV)/bin/pip
 	$(bin)/pip install --quiet "$(PACKAGE)[dev]"
 	cargo test --workspace --locked
 	cd $(TREE) && $(bin)/python -m pytest
 
-$(VENV):
+$(VENV)/bin/pip:
 	$(PYTHON) -m venv $(VENV)
