@@ -1,4 +1,4 @@
-"""The level ground site of scene.toml, said in Python: see there for the sources. Run it to compute it."""
+"""The level ground of scene.toml in Python; scene.toml names the sources. Running this file computes it."""
 
 import sandboil as sb
 

@@ -15,7 +15,7 @@ DURATION = 12.0
 
 
 class Response(NamedTuple):
-    """What is judged: r_u over time at 4, 11 and 17 m, and the state at the end."""
+    """The quantities compared: r_u over time at 4, 11 and 17 m, and the state at the end."""
 
     time: np.ndarray
     r_u: np.ndarray
@@ -86,14 +86,14 @@ def test_conductivity_of_a_trillionth_is_undrained() -> None:
 
 
 def test_conductivity_of_one_metre_per_second_is_drained() -> None:
-    """Stable at the step of the dry skeleton; pressure leaves as fast as it comes."""
+    """Stable at the step of the dry skeleton; pressure dissipates as fast as it is generated."""
     permeable = respond(conductivity=1.0)
     assert permeable.r_u_max.max() < 0.05
     assert permeable.simulation.dt_limit == "drained compression wave"
 
 
 def test_water_a_hundred_times_softer_is_stable_and_wrong_as_announced() -> None:
-    """Stable; pore pressure falls short, which the pressure coefficient B of the plan tells beforehand."""
+    """Stable; pore pressure is too low, as the pressure coefficient B of the plan announces."""
     soft = respond(bulk_modulus=1.0e4)
     assert (soft.r_u_max < usual().r_u_max).all()
     with pytest.raises(AssertionError):
@@ -104,21 +104,21 @@ def test_water_a_hundred_times_softer_is_stable_and_wrong_as_announced() -> None
 
 
 def test_water_a_hundred_times_stiffer_changes_nothing_but_the_step() -> None:
-    """Stable; water is as good as incompressible already."""
+    """Stable; the default water is nearly incompressible already."""
     stiff = respond(bulk_modulus=1.0e8)
     assert np.abs(stiff.r_u_max - usual().r_u_max).max() < 0.05
     assert stiff.simulation.dt > 0.4 * usual().simulation.dt
 
 
 def test_a_thousandth_of_gravity_hardly_moves_the_sand() -> None:
-    """Stable; elastic response, no pore pressure to speak of."""
+    """Stable; elastic response, negligible pore pressure."""
     faint = respond(pga_g=0.001)
     assert faint.r_u_max.max() < 0.01
     assert 1e-4 < np.abs(faint.surface_velocity).max() < 5e-3
 
 
 def test_three_gravities_liquefy_everything() -> None:
-    """Stable; r_u passes one for moments, since shaking also moves the total stress."""
+    """Stable; r_u exceeds one for moments, since shaking also changes the total stress."""
     violent = respond(pga_g=3.0)
     assert (violent.r_u_max > 0.95).all()
     assert (violent.r_u_max < 1.3).all()
@@ -130,7 +130,7 @@ def test_sand_next_to_its_loosest_liquefies_to_the_base() -> None:
     """Stable; all of it liquefies."""
     loose = respond(layers=densities(0.05))
     assert (loose.r_u_max > 0.85).all()
-    # Soil this much softer bears a longer step, which the run takes.
+    # Soil this soft allows a longer step, which the run takes.
     assert loose.simulation.counters()["time_step_changes"] > 0
 
 
@@ -141,7 +141,7 @@ def test_sand_at_its_densest_does_not_liquefy() -> None:
 
 
 def test_a_loose_layer_one_particle_thick_takes_the_strain() -> None:
-    """Stable; the strain gathers in the layer and its neighbours, as far as one kernel reaches."""
+    """Stable; the strain concentrates in the layer and its neighbours, within one kernel support."""
     dense, loose = LAYERS[2][2], LAYERS[0][2]
     layers = [("top", (10.2, 20), dense), ("thin", (10, 10.2), loose), ("low", (0, 10), dense)]
     response = respond(layers=layers, spacing=0.2)
@@ -161,7 +161,7 @@ def test_a_spacing_that_does_not_divide_the_column() -> None:
 
 
 def test_a_hundred_seconds_of_quiet_move_nothing() -> None:
-    """Exact: not a bit of displacement after the switch to the compliant base."""
+    """Exact: no displacement after the switch to the compliant base."""
     quiet = respond(pga_g=None, duration=100.0)
     assert np.abs(quiet.simulation.field("displacement")).max() < 1e-9
     assert np.abs(quiet.r_u).max() < 1e-12

@@ -1,4 +1,4 @@
-"""Slopes and a dam on boundaries that hold still, through the scenes that a user writes."""
+"""Slopes and a dam at rest on free edges, and waves that leave them, with scenes as a user writes them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import sandboil as sb
 
 # Displacement that counts as rest, m.
 REST = 1.0e-8
-# The water stands this high over the highest ground, m.
+# Depth of the water above the highest ground, m.
 POND = 1.0
 
 SOILS: dict[str, sb.Elastic | sb.PM4Sand | sb.DruckerPrager] = {
@@ -21,7 +21,7 @@ SOILS: dict[str, sb.Elastic | sb.PM4Sand | sb.DruckerPrager] = {
 
 
 def infinite_slope(angle: float) -> list[tuple[float, float]]:
-    """A layer 12 m thick on a base that is as steep as its surface, 40 m of it."""
+    """A layer 12 m thick on a base as steep as its surface, 40 m long."""
     width, thickness = 40.0, 12.0
     rise = width * math.tan(math.radians(angle))
     return [(0.0, 0.0), (width, rise), (width, rise + thickness), (0.0, thickness)]
@@ -35,7 +35,7 @@ SHAPES = {
 
 
 def scene(shape: str, soil: str, *, wet: bool, vertical: str, duration: float) -> sb.Scene:
-    """A section of one soil between free-field sides, standing on its dashpots."""
+    """A section of one soil between free-field sides, on the dashpots of its base."""
     points = SHAPES[shape]
     top = max(y for _, y in points)
     densities = {} if soil == "sand" else {"porosity": 0.42}
@@ -78,7 +78,7 @@ def moved(stood: sb.Scene) -> float:
 @pytest.mark.parametrize("soil", SOILS)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_slope_stands_on_free_edges(shape: str, soil: str, wet: bool) -> None:
-    """Five seconds, which a growing mode does not survive; the slow test gives it a hundred."""
+    """Five seconds, in which a growing mode would show; a hundred in the slow test."""
     vertical = "absorbing" if soil == "sand" else "roller"
     assert moved(scene(shape, soil, wet=wet, vertical=vertical, duration=5.0)) < REST
 
@@ -93,21 +93,21 @@ def test_a_slope_stands_for_a_hundred_seconds(shape: str, soil: str, wet: bool, 
 
 
 def hill(half_width: float, motion: sb.Motion) -> sb.Scene:
-    """A hill with slopes of 1:2 on ten metres of ground, free-field sides so far from its middle."""
+    """A hill with slopes of 1:2 on ten metres of ground, sides at `half_width` (m) from its middle."""
     end = half_width
     points = [(-end, 0), (end, 0), (end, 10), (12, 10), (4, 14), (-4, 14), (-12, 10), (-end, 10)]
     return elastic_ground(points, sb.FreeField(), [(0.0, 14.0), (-8.0, 12.0), (0.0, 5.0)], motion)
 
 
 def test_sides_near_a_hill_do_what_sides_far_away_do(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """A section and one three times as wide: what the hill scatters has left through the near sides."""
+    """A section and one three times as wide: waves scattered by the hill leave through the near sides."""
     folder = tmp_path_factory.mktemp("hill")
     motion = sb.Motion.ricker(frequency=3.0, pga_g=0.1)
     near, far = (sb.run(hill(half, motion), folder / f"{half:g}", threads=2) for half in (30.0, 90.0))
     for point in near.scene.output.points:
         for name in ("velocity_x", "velocity_y"):
             then, now = far.history(name, at=point), near.history(name, at=point)
-            # Both directions are measured by the horizontal peak at the place.
+            # Differences in both directions are relative to the horizontal peak at the place.
             peak = np.abs(far.history("velocity_x", at=point).values).max()
             apart = np.abs(np.interp(then.time, now.time, now.values) - then.values).max()
             print(f"{point} {name}: {apart / peak:.2%} of the peak apart")
@@ -115,7 +115,7 @@ def test_sides_near_a_hill_do_what_sides_far_away_do(tmp_path_factory: pytest.Te
 
 
 def benches(beyond: float, motion: sb.Motion) -> sb.Scene:
-    """A slope of 1:2 between benches of different height, that go on so far beyond x = 0 and x = 70 m."""
+    """A slope of 1:2 between benches of different height, which extend `beyond` x = 0 and x = 70 m."""
     left, right = -beyond, 70.0 + beyond
     points = [(left, 0), (right, 0), (right, 16), (41, 16), (29, 10), (left, 10)]
     return elastic_ground(points, sb.FreeField(), [(0.0, 10.0), (70.0, 16.0)], motion)
@@ -138,7 +138,7 @@ def elastic_ground(
 
 
 def test_sides_of_a_slope_move_as_the_ground_there(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """A side moves as level ground of its height and lets pass what the slope scatters."""
+    """A side moves as level ground of its height and transmits waves scattered by the slope."""
     folder = tmp_path_factory.mktemp("benches")
     motion = sb.Motion.ricker(frequency=3.0, pga_g=0.1)
     near, far = (sb.run(benches(way, motion), folder / f"{way:g}", threads=2) for way in (0.0, 70.0))
@@ -156,7 +156,7 @@ def test_sides_of_a_slope_move_as_the_ground_there(tmp_path_factory: pytest.Temp
         apart = np.abs(side - ground).max() / peak
         print(f"x = {x:g} m: the slope scatters {scattered:.1%} of the peak, the side adds {apart:.1%}")
         assert apart < 0.1
-        # Before anything scattered arrives the side is its column.
+        # Before scattered waves arrive the side moves as its column.
         early = column.time < 0.45
         assert np.abs(side - column.values)[early].max() < 0.02 * peak
 
@@ -174,7 +174,7 @@ def column_and_block(
     base: sb.CompliantBase | None = None,
     duration: float = 2.0,
 ) -> tuple[sb.Run, sb.Run]:
-    """A periodic column and four metres of the same ground between free-field sides, shaken alike."""
+    """A periodic column, and four metres of its ground between free-field sides, under the same motion."""
     runs = []
     for name, width, sides in (("column", 0.25, sb.Periodic()), ("block", 4.0, sb.FreeField())):
         densities = {} if isinstance(soil, sb.PM4Sand) else {"porosity": 0.42}
@@ -214,7 +214,7 @@ def apart(column: sb.Run, block: sb.Run, name: str, **at: object) -> float:
 
 @pytest.mark.parametrize("pga_g", [0.001, 3.0])
 def test_weak_and_strong_shaking(pga_g: float, tmp_path: object) -> None:
-    """Elastic ground answers in proportion, sand at 3 g stays sound; a block does what its column does."""
+    """Elastic ground is linear, sand at 3 g stays finite; a block moves as its column does."""
     motion = sb.Motion.ricker(frequency=3.0, pga_g=pga_g)
     column, block = column_and_block(motion, f"{tmp_path}/elastic")
     found = apart(column, block, "velocity_x")
@@ -226,7 +226,7 @@ def test_weak_and_strong_shaking(pga_g: float, tmp_path: object) -> None:
     then, now = (run.history("r_u", depth=3.0) for run in (column, block))
     assert np.isfinite(then.values).all()
     assert np.isfinite(now.values).all()
-    # At 3 g the sand dilates to r_u = -3.6 and what follows hangs on the time step alone (r_u at the end of
+    # At 3 g the sand dilates to r_u = -3.6, and later values depend on the time step alone (r_u at the end of
     # the column: 0.62 to 0.79 for factors of 0.3 to 0.6): they are compared until then and bounded after it.
     early = then.time < 0.5
     difference = np.abs(np.interp(then.time, now.time, now.values) - then.values)
@@ -275,7 +275,7 @@ def test_half_spaces_softer_and_harder_than_the_ground(contrast: float, tmp_path
     k_h = 2.0 * np.pi * frequencies / speed * 5.0
     exact = 1.0 / np.abs(np.cos(k_h) + 1j * np.sin(k_h) / contrast)
     print(f"contrast {contrast:g}: {found} against {exact} at {frequencies} Hz, rate {rate:g} Hz")
-    # A half-space a hundred times softer lets the ground ring out for longer than the run.
+    # A half-space a hundred times softer lets the ground vibrate for longer than the run.
     assert found == pytest.approx(exact, rel=0.03)
 
 
@@ -287,7 +287,7 @@ def test_a_base_one_metre_below_ground(tmp_path: object) -> None:
 
 
 def test_a_step_in_the_record(tmp_path: object) -> None:
-    """A half-space that starts to move at once: the ground follows, and keeps the outcrop's velocity."""
+    """A half-space that starts to move at once: the ground reaches the outcrop's velocity and keeps it."""
     step = sb.Motion(dt=0.01, velocity=np.r_[np.zeros(20), np.full(400, 0.1)])
     with pytest.warns(sb.SandboilWarning, match="ends with a velocity"):
         column, block = column_and_block(step, tmp_path, duration=3.0)
@@ -295,6 +295,6 @@ def test_a_step_in_the_record(tmp_path: object) -> None:
     surface = block.history("velocity_x")
     settled = surface.values[(surface.time > 1.0) & (surface.time < 2.5)]
     print(f"{found:.2%} from the column, {surface.values.max():.4f} m/s at most, then {settled.min():.4f}")
-    # A jump within one sample holds waves that the lattice cannot carry; they overshoot and die out.
+    # A jump within one sample contains waves that the lattice cannot carry; they overshoot and decay.
     assert surface.values.max() < 0.14
     assert settled == pytest.approx(0.1, rel=0.01)

@@ -1,4 +1,4 @@
-"""Direct simple shear and strain paths through the public laboratory, held to OpenSees."""
+"""Direct simple shear and strain paths through the public laboratory, against OpenSees."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Model B between free-field sides does what model A does, and what OpenSees does."""
+"""Model B, between free-field sides, agrees with model A and with OpenSees."""
 
 from __future__ import annotations
 

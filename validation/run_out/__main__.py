@@ -3,7 +3,7 @@
     python -m validation.run_out --threads 2
 
 Prints the tables and draws `run_out.png`. Dry columns of sand on a rough bed, released by a
-gate, run out by (L - L0)/L0 = 1.2 a for a = H0/L0 below 1.8, whatever the sand (Lube, Huppert, Sparks &
+gate, run out by (L - L0)/L0 = 1.2 a for a = H0/L0 below 1.8, for any sand (Lube, Huppert, Sparks &
 Freundt 2005, Phys. Rev. E 72, 041301). The other heap is that of Bui et al. (2008).
 """
 
@@ -24,7 +24,7 @@ from scipy.spatial import KDTree
 
 # Nodes further apart than this, in spacings, are not connected.
 LINK = 2.0
-# The law of the experiments, and the friction angles of the sands and grains behind it, degrees.
+# The factor of the law of the experiments, and the friction angle used here for their sands, degrees.
 LAW = 1.2
 SANDS = 31.0
 DEFAULT_VISCOSITY = 0.1
@@ -143,7 +143,7 @@ def against_experiments(figure: Figure, threads: int) -> None:
 
 
 def trades(figure: Figure, threads: int) -> None:
-    """What viscosity, spacing, and the knobs of the geometry and the step change."""
+    """Effect of viscosity, spacing, and the numerics of the geometry and the step."""
     head("dry heap")
     curves: dict[str, tuple[list[float], list[float]]] = {}
     for name, values in {
@@ -167,7 +167,7 @@ def trades(figure: Figure, threads: int) -> None:
 
 
 def waters(figure: Figure, threads: int) -> None:
-    """Heaps full of water, in air and below it, and the ends of their ranges."""
+    """Saturated heaps, in air and below water, and the ends of the range."""
     head("heap full of water, spacing 0.01 m")
     axes = figure.add_subplot(1, 3, 3)
     spacing = 0.01

@@ -133,11 +133,11 @@ def draw_closed_forms() -> None:
         ("pond on dry sand, 1200 s", -8.0, [sb.Head("surface", head=1.0)], None, False, 1200.0),
         ("rain on dry sand, 5000 s", -8.0, [sb.Rain("surface", rate=2e-5)], 2e-5, False, 5000.0),
     ]
-    for (name, start, said, rain, open_base, duration), colour in zip(cases, ("C0", "C1"), strict=True):
+    for (name, start, conditions, rain, open_base, duration), colour in zip(cases, ("C0", "C1"), strict=True):
         fine = fine_column(start, rain, open_base, duration)
         centres = (np.arange(len(fine)) + 0.5) / len(fine)
         right.plot(fine, centres, colour, label=f"{name}: method of lines, 300 cells")
-        elevation, saturation = column(start, said, duration, 0.05)
+        elevation, saturation = column(start, conditions, duration, 0.05)
         right.plot(saturation, elevation, f"{colour}o", ms=4, label="20 rows")
     right.set(xlabel="degree of saturation, 1", ylabel="elevation, m")
     right.legend(fontsize=8)

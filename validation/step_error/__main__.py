@@ -34,7 +34,7 @@ CURVES = {
     ("reference", "NaN"): ("reference", "k", "*-"),
 }
 DEFAULT_PART = 5e-6
-# Cycles that stand for a test that never liquefies.
+# Number of cycles drawn for a test that never liquefies.
 NEVER = 18.0
 # Lines of order two and four: their value at a part of 1e-6, kPa.
 ORDERS = ((2, 1.2e-3), (4, 3e-7))
