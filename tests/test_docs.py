@@ -121,13 +121,13 @@ def folders_of_the_layout(tree: str) -> list[str]:
 
 
 def test_the_layout_is_that_of_the_core() -> None:
-    """CONTRIBUTING.md lists the crates and the folders of the solver, all of them."""
+    """CONTRIBUTING.md lists all crates, and all folders of the solver and of the package."""
     tree = CONTRIBUTING.read_text(encoding="utf-8").partition("## Layout")[2].split("```\n")[1]
     listed = folders_of_the_layout(tree)
     for folder in listed:
-        assert (ROOT / folder).is_dir() or not folder.startswith("crates/"), folder
-    for parent in ("crates/", "crates/sandboil-solver/src/"):
-        there = {f"{parent}{path.name}/" for path in (ROOT / parent).iterdir() if path.is_dir()}
+        assert (ROOT / folder).is_dir(), folder
+    for parent in ("crates/", "crates/sandboil-solver/src/", "python/sandboil/"):
+        there = {f"{parent}{path.name}/" for path in (ROOT / parent).glob("[a-z]*/")}
         assert there <= set(listed)
 
 

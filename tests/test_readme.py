@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from sandboil import Run, lab
+from sandboil.run import plan
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
@@ -30,7 +31,7 @@ def commands_of(page: Path) -> list[str]:
 def short_trials(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Plans that take little time, and a folder for the results."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("sandboil.plan.TRIAL_SECONDS", 0.2)
+    monkeypatch.setattr(plan, "TRIAL_SECONDS", 0.2)
 
 
 def run(page: Path) -> dict[str, object]:

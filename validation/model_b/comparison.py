@@ -33,8 +33,7 @@ def scenes(motion: sb.Motion, spacing: float) -> tuple[sb.Scene, sb.Scene]:
     model_a = site.scene(motion, spacing=spacing)
     model_b = site.scene(motion, spacing=spacing, width=WIDTH, sides=sb.FreeField())
     beside = [(0.5 * spacing, model_b.bounds[3] - depth) for depth in DEPTHS]
-    output = model_b.output.model_copy(update={"points": tuple(beside)})
-    return model_a, model_b.model_copy(update={"output": output})
+    return model_a, model_b.changed(**{"output.points": beside})
 
 
 def surface_acceleration(run: sb.Run) -> tuple[Floats, Floats]:

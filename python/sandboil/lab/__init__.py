@@ -2,7 +2,7 @@
 
 Stresses are effective, in kPa, compression positive; strains are fractions, contraction positive. Exceptions
 are :func:`strain_path` and :func:`stress_path`: their tensors are tension positive. Shear strain is
-engineering strain. `docs/laboratory.md` describes each test.
+engineering strain. `docs/guide/laboratory.md` describes each test.
 """
 
 from . import correlations

@@ -12,7 +12,7 @@ from .._model import Model
 from .._types import Number, Positive
 
 # Strength of the velocity filter: enough that liquefied sand keeps no grid-scale noise that would change an
-# answer, while a wave of 20 particles loses only 0.04 % to it (docs/validation.md).
+# answer, while a wave of 20 particles loses only 0.04 % to it (validation/README.md).
 DEFAULT_VELOCITY_FILTER = 0.2
 
 _LEAVE: JsonDict = {"remedy": "leave it out for the default, which suits most scenes"}
