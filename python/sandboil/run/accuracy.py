@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
 Accuracy = Literal["draft", "standard", "reference"]
 
-# Measured on the level ground (validation/level_ground/README.md, rows "draft" and "explicit"): the draft makes
-# fewer steps with a coarser soil update; the reference solves the pore water explicitly, with its acceleration
-# where it can, in more of them.
+# Measured on the level ground (rows "draft" and "explicit" of validation/level_ground/README.md): the draft
+# makes fewer steps with a coarser soil update; the reference solves the pore water explicitly, with its
+# acceleration where it can, in more of them.
 ACCURACY: dict[str, dict[str, Any]] = {
     "draft": {"integrator_tolerance": 1.0e-4, "time_step_factor": 0.9},
     "standard": {},
