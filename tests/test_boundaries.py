@@ -336,7 +336,7 @@ LATE = [BaseSegment((0, 20)), BaseSegment((20, 40), delay=1.5)]
 @pytest.mark.parametrize(
     ("make", "path", "told"),
     [
-        (lambda: CompliantBase(Vp=900.0), "base.Vp", "goes with Vs"),
+        (lambda: CompliantBase(Vp=900.0), "base.Vp", "needs Vs and density"),
         (lambda: CompliantBase(Vs=400.0, density=2.1, Vp=500.0), "base.Vp", "at least 565.7 m/s"),
         (lambda: CompliantBase(apparent_velocity=0.0), "base.apparent_velocity", "must not be zero"),
         (

@@ -194,7 +194,12 @@ def test_a_run_that_cannot_write_exits_with_3_and_resumes(tmp_path: Path, finish
     )
     assert (limited.returncode, limited.stdout) == (STOPPED, "")
     told = limited.stderr.replace("\n", " ")
-    for part in ("could not be written", "File too large", "is kept: mend that and resume", "results.h5"):
+    for part in (
+        "could not be written",
+        "File too large",
+        "is kept: remove the cause and resume",
+        "results.h5",
+    ):
         assert part in told
     assert "Traceback" not in told
     assert load(out).status == "running"
@@ -205,7 +210,7 @@ def test_a_run_that_cannot_write_exits_with_3_and_resumes(tmp_path: Path, finish
     assert done.returncode == DONE
     assert (
         done.stderr
-        == f"warning: {newest} is damaged: its checksum is not that of its bytes; it is passed over\n"
+        == f"warning: {newest} is damaged: its checksum is not that of its bytes; it is left out\n"
     )
     assert done.stdout.split()[:2] == ["status", "complete"]
     np.testing.assert_array_equal(load(out).field("displacement"), finished.field("displacement"))

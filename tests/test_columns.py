@@ -90,7 +90,7 @@ def test_a_run_keeps_nothing_unless_it_is_asked(tmp_path: Path) -> None:
         (ground(numerics=sb.Numerics(velocity_filter=0.3)), "other ground, motion or numerics"),
         (ground(gravity=9.8), "other ground, motion or numerics"),
         (ground(tolerance=1.0e-5), "other ground, motion or numerics"),
-        (ground(sides=sb.Roller()), "goes with free-field sides"),
+        (ground(sides=sb.Roller()), "needs a shaking stage beside free-field sides"),
         (ground(sides=sb.Sides(sb.FreeField(), sb.Roller()), motion=MOTION.flipped()), "on the left"),
     ],
 )

@@ -463,9 +463,9 @@ def test_plan_tells_what_seepage_costs() -> None:
 
 
 def test_columns_do_not_go_with_seepage(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="does not go with a seepage stage"):
+    with pytest.raises(InvalidInput, match="cannot be used with a seepage stage"):
         Simulation(dam(sides=FreeField()), keep_columns=True)
-    with pytest.raises(InvalidInput, match="does not go with a seepage stage"):
+    with pytest.raises(InvalidInput, match="cannot be used with a seepage stage"):
         run(dam(sides=FreeField()), tmp_path, columns=tmp_path)
 
 

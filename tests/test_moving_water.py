@@ -111,7 +111,7 @@ def test_a_drain_lowers_what_shaking_raises() -> None:
             {"water": None, "water_table": None},
             [sb.Head("base", head=8.0)],
             "stages[1].conditions",
-            "go with water",
+            "need water",
         ),
         ({}, [sb.Head("base", head=-1.0)], "conditions[0].head", "below the base"),
         ({}, [sb.Drain([(0, 9), (4, 9)])], "conditions[0].points", "in the section"),

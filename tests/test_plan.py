@@ -84,7 +84,7 @@ def test_a_long_way_to_rest_is_not_foretold(monkeypatch: pytest.MonkeyPatch) -> 
     plan = scenes.column(stages=[Gravity(tolerance=1e-12)]).plan()
     assert plan.stages[0].steps is None
     assert plan.wall_time is None
-    assert "not known before" in str(plan)
+    assert "not known in advance" in str(plan)
 
 
 def test_a_shaking_without_a_motion_is_planned() -> None:

@@ -246,7 +246,7 @@ def test_a_run_killed_before_its_first_checkpoint_begins_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path
 ) -> None:
     killed_run(tmp_path, 1, monkeypatch)
-    with pytest.warns(ResumeWarning, match="begins anew"):
+    with pytest.warns(ResumeWarning, match="begins again"):
         run(scenes.column(), tmp_path, threads=1, resume=True)
     assert_same(tmp_path, whole)
 
@@ -289,7 +289,7 @@ def test_a_damaged_checkpoint_is_told_and_the_one_before_is_taken(
     killed_run(tmp_path, 45, monkeypatch)
     _, newest = states(tmp_path)
     damage(newest)
-    with pytest.warns(ResumeWarning, match=rf"{newest.name} is damaged: its checksum .* passed over") as told:
+    with pytest.warns(ResumeWarning, match=rf"{newest.name} is damaged: its checksum .* left out") as told:
         run(scenes.column(), tmp_path, threads=1, resume=True)
     assert len(told) == 1
     assert_same(tmp_path, whole)
@@ -325,7 +325,7 @@ def test_results_that_cannot_be_read_are_those_of_their_twin(
     # The twin is one commit behind, and so the newest checkpoint may be too far ahead.
     with (
         pytest.warns(ResumeWarning, match="its second copy is taken"),
-        pytest.warns(ResumeWarning, match="passed over: .* does not reach it"),
+        pytest.warns(ResumeWarning, match="left out: .* ends before it"),
     ):
         run(scenes.column(), tmp_path, threads=1, resume=True)
     assert_same(tmp_path, whole)
@@ -415,7 +415,7 @@ def test_other_ground_does_not_start_there(tmp_path: Path, whole: Path) -> None:
         with pytest.raises(InvalidInput, match=told) as caught:
             run(scenes.column(**changed), tmp_path / "out", start=(whole, "gravity"))
         assert caught.value.path == "start"
-    with pytest.raises(InvalidInput, match="must be a run and a stage that it has ended: gravity, shaking"):
+    with pytest.raises(InvalidInput, match="a stage that it has completed: gravity, shaking"):
         run(scenes.column(), tmp_path / "out", start=(whole, "grvity"))
     with pytest.raises(InvalidInput, match="must be a stage of the scene: gravity"):
         run(scenes.column(stages=[sb.Gravity()]), tmp_path / "out", start=(whole, "shaking"))
@@ -577,7 +577,7 @@ def test_a_folder_that_can_no_longer_be_written_ends_the_run(
         patch.setattr(sb.Simulation, "advance", advancing)
         try:
             with pytest.raises(
-                SandboilError, match=r"could not be written to .*: mend that and resume"
+                SandboilError, match=r"could not be written to .*: remove the cause and resume"
             ) as told:
                 run(scenes.column(), tmp_path / "out", threads=1, checkpoint_time=0.05)
         finally:

@@ -252,7 +252,7 @@ REFUSED: dict[str, tuple[Callable[[], object], str, str]] = {
     "fluxes alone on the way to a steady state": (
         lambda: dam([sb.Flux("left", inflow=1e-6), sb.Flux("right", inflow=-1e-6)]),
         "scene.stages[0].conditions",
-        "must tell the pressure somewhere",
+        "must fix the pressure somewhere",
     ),
     "change on the way to a steady state": (
         lambda: dam([sb.Reservoir("left", level=[(0, 8), (9, 2)])]),
@@ -272,7 +272,7 @@ REFUSED: dict[str, tuple[Callable[[], object], str, str]] = {
     "condition on a periodic side": (
         lambda: dam(sides=sb.Periodic()),
         "scene.stages[0].conditions[0].on",
-        "does not go with periodic sides",
+        "must not be a periodic side",
     ),
     "alpha of zero": (lambda: sb.VanGenuchten(0.0, 2.0), "retention.alpha", "must lie in (0, 1000]"),
     "n of one": (lambda: sb.VanGenuchten(1.0, 1.0), "retention.n", "must lie in (1, 20]"),

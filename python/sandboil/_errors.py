@@ -6,16 +6,16 @@ import difflib
 import reprlib
 from collections.abc import Iterable
 
-# Similarity below which a suggestion would rather puzzle than help (difflib ratio, 0 to 1).
+# Similarity below which a suggestion would puzzle more than help (difflib ratio, 0 to 1).
 _NEAREST_CUTOFF = 0.5
 # Longest name compared with others, characters: no name of ours is longer, and comparing takes their product.
 _LONGEST_NAME = 100
 
-# How much of a refused value is told: a few lines, whatever a file may hold.
+# How much of a refused value a message shows: a few lines, however large the value is.
 _SHOWN = reprlib.Repr()
 _SHOWN.maxlist = _SHOWN.maxtuple = _SHOWN.maxdict = 12
 _SHOWN.maxstring = _SHOWN.maxlong = 120
-# Longest part of a message, characters: a text of a user's file may stand in it.
+# Longest part of a message, characters: it may contain text of a user's file.
 _SHOWN.maxother = _LONGEST_PART = 600
 
 
@@ -34,10 +34,10 @@ class InvalidInput(SandboilError, ValueError):
 
     Attributes
     ----------
-    path : where the value stands, for example ``scene.regions[0].porosity``
-    value : the value found there
+    path : the place of the value, for example ``scene.regions[0].porosity``
+    value : that was given there
     allowed : what would be accepted, for example ``must lie in (0, 1)``
-    hint : nearest right name or how to mend it, or None
+    hint : the nearest right name or the remedy, or None
     """
 
     def __init__(self, path: str, value: object, allowed: str, hint: str | None = None) -> None:
@@ -53,7 +53,7 @@ class InvalidInput(SandboilError, ValueError):
 
 
 class SimulationDiverged(SandboilError):
-    """A field lost its meaning during a run; what was computed before is kept.
+    """A field became infinite or not a number during a run; what was computed before is kept.
 
     Attributes
     ----------
@@ -91,19 +91,19 @@ class SimulationDiverged(SandboilError):
 
 
 class DamagedState(SandboilError):
-    """A stored state whose bytes are not as they were written."""
+    """A stored state whose bytes have changed since they were written."""
 
 
 class SandboilWarning(UserWarning):
-    """An answer that may not be what was meant: the text says why, and what would mend it."""
+    """An answer that may not be what was meant. The text gives the reason and the remedy."""
 
 
 class SuctionWarning(SandboilWarning):
-    """Seepage left a suction in soil that does not say what it holds then: the text says where."""
+    """Seepage left a suction in soil without a retention curve. The text gives the place."""
 
 
 class ResumeWarning(UserWarning):
-    """A run that is gone on with found something damaged or missing: the text says what, and what it took."""
+    """A resumed run found something damaged or missing. The text names it, and what was used instead."""
 
 
 class RunInterrupted(SandboilError):

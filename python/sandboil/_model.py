@@ -63,7 +63,7 @@ class Model(BaseModel):
         Names are fields, or paths into parts, given by a dict: ``scene.changed(spacing=0.1)``,
         ``scene.changed(**{"stages[1].motion": motion, "regions['sand'].K0": 0.6})``. A part of a sequence is
         named by its place, negative from the end, or by its name if it has one. Raises :class:`InvalidInput`
-        for an unknown path, and whatever construction refuses.
+        for an unknown path, and for everything that construction refuses.
         """
         return type(self)(**_changes.applied(self, changes))
 

@@ -1,6 +1,6 @@
 """Functions that a class offers as a method, and that are built on the class itself.
 
-Such a function stands in a module above that of the class. The class names it, the module above provides it,
+The class declares such a function, the module with the function provides it,
 and `import sandboil` loads both.
 """
 

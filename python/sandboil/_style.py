@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Colours that the colour-blind tell apart (Okabe and Ito 2008): ours, the input's, and the reference's.
+# Colours for the colour-blind, too (Okabe and Ito 2008): ours, the input's, and the reference's.
 OURS, INPUT, REFERENCE = "#0072B2", "#999999", "#D55E00"
 DPI = 150
 STYLE: dict[Any, Any] = {

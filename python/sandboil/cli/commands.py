@@ -52,7 +52,7 @@ MotionOption = Annotated[
     Path | None, typer.Option("--motion", help="Shake by this record (.AT2 or CSV) instead of the scene's.")
 ]
 RunKindOption = Annotated[
-    Kind | None, typer.Option("--kind", help="Where the --motion is one of; default outcrop.")
+    Kind | None, typer.Option("--kind", help="Place for which the --motion is given; default outcrop.")
 ]
 ThreadsOption = Annotated[int, typer.Option(help="Threads; the results do not depend on their number.")]
 AccuracyOption = Annotated[Accuracy, typer.Option(help="Fills the numerics that the scene leaves open.")]
@@ -78,7 +78,7 @@ def plan(
     accuracy: AccuracyOption = "standard",
     threads: ThreadsOption = 2,
 ) -> None:
-    """Tell what a run would compute and cost, from a trial of some seconds. Writes nothing."""
+    """Show what a run would compute and cost, from a trial of some seconds. Writes nothing."""
     typer.echo(str(plan_of(_scene(scene, motion, unit, column, kind), threads, accuracy)))
 
 
@@ -99,7 +99,7 @@ def run(
         bool, typer.Option("--keep-columns", help="Keep the free-field columns for other runs.")
     ] = False,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the run in the folder from its last checkpoint.")
+        bool, typer.Option("--resume", help="Continue the run in the folder from its last checkpoint.")
     ] = False,
     checkpoint_seconds: Annotated[
         float, typer.Option(help="Wall time between checkpoints, s.")
@@ -108,19 +108,19 @@ def run(
         float | None, typer.Option(help="Also so often in the time of shaking, s.")
     ] = None,
 ) -> None:
-    """Compute a scene. Ctrl-C ends it with readable results, to be gone on with by --resume."""
-    said = _scene(scene, motion, unit, column, kind)
-    for doubt in doubts(said, loaded_motions(said)):
-        _tell(doubt)
+    """Compute a scene. Ctrl-C ends it with readable results; --resume continues it."""
+    wanted = _scene(scene, motion, unit, column, kind)
+    for doubt in doubts(wanted, loaded_motions(wanted)):
+        _warn(doubt)
     try:
         with warnings.catch_warnings():
-            # They are told above, before the run's long time.
+            # They are printed above, before the long run.
             warnings.simplefilter("ignore", SandboilWarning)
-            for told_later in (ResumeWarning, SuctionWarning):
-                warnings.simplefilter("always", told_later)
-            warnings.showwarning = _tell
+            for shown in (ResumeWarning, SuctionWarning):
+                warnings.simplefilter("always", shown)
+            warnings.showwarning = _warn
             results = run_scene(
-                said,
+                wanted,
                 out,
                 threads=threads,
                 accuracy=accuracy,
@@ -138,7 +138,7 @@ def run(
     typer.echo(str(results.summary()))
 
 
-def _tell(
+def _warn(
     message: Warning | str,
     category: type[Warning] = UserWarning,
     filename: str = "",
@@ -146,7 +146,7 @@ def _tell(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Print a warning on stderr: its text and nothing of where in the code it came from."""
+    """Print a warning on stderr: its text without a place in the code."""
     typer.echo(f"warning: {message}", err=True)
 
 
@@ -160,8 +160,8 @@ def plot(
     stage: Annotated[str | None, typer.Option(help="A shaking stage, default the last.")] = None,
 ) -> None:
     """Draw a run as PNG: seepage, the surface's motion, pore pressure, the column and stress paths."""
-    laid_over = None if reference is None else Reference.read(reference)
-    for path in draw(load(folder), out, reference=laid_over, stage=stage):
+    other = None if reference is None else Reference.read(reference)
+    for path in draw(load(folder), out, reference=other, stage=stage):
         typer.echo(str(path))
 
 

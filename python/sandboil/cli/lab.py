@@ -61,7 +61,7 @@ def dss(
     out: OutOption = None,
     plot: PlotOption = None,
 ) -> None:
-    """Direct simple shear, cyclic (--csr) or --monotonic; prints what one asks of such a test."""
+    """Direct simple shear, cyclic (--csr) or --monotonic; prints its usual results."""
     common: dict[str, Any] = {
         "sigma_v0": sigma_v0,
         "K0": K0,
@@ -112,7 +112,7 @@ def cell(
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
         row = bar.add_task("cycles", total=max_cycles)
 
-        def told(cycle: float, gamma: float) -> None:
+        def shown(cycle: float, gamma: float) -> None:
             bar.update(row, completed=cycle, description=f"{cycle:.2f} cycles, {100.0 * gamma:+.2f} %")
 
         test = lab.shear_cell(
@@ -126,7 +126,7 @@ def cell(
             spacing=spacing,
             inertia=inertia,
             integrator=integrator,
-            progress=told,
+            progress=shown,
             threads=threads,
         )
     spread = f"{100.0 * test.report.gamma_spread:.2g} % strain, {test.report.tau_spread:.2g} kPa"
@@ -159,7 +159,7 @@ def strain_path(
     integrator: IntegratorOption = "default",
     out: OutOption = None,
 ) -> None:
-    """Lead a soil through strains, tension positive; prints or writes the stresses as CSV."""
+    """Impose strains on a soil, tension positive; prints or writes the stresses as CSV."""
     test = lab.strain_path(
         soil_of(soil, Dr=Dr, G0=G0, hpo=hpo),
         stress0=stress0,
@@ -205,10 +205,10 @@ def calibrate(
             raise InvalidInput(
                 f"--{name}",
                 None,
-                "is required unless --spt or --cpt says it",
+                "is required unless --spt or --cpt is given",
                 f"add --{name}, or a field test",
             )
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as shown:
         warnings.simplefilter("always", lab.CalibrationWarning)
         result = lab.calibration(
             **asked,
@@ -220,7 +220,7 @@ def calibrate(
             void_ratio=void_ratio,
             integrator=integrator,
         )
-    for warning in told:
+    for warning in shown:
         typer.echo(f"warning: {warning.message}", err=True)
     text = _toml.text(result.soil.model_dump(exclude_none=True))
     typer.echo(

@@ -15,12 +15,13 @@ from .outputs import motion_to_write
 app = typer.Typer(help="Look at ground motions and convert them.", no_args_is_help=True)
 
 UnitOption = Annotated[
-    str | None, typer.Option(help="Unit of a CSV's values: g, m/s2, cm/s2 or m/s, unless its header says it.")
+    str | None,
+    typer.Option(help="Unit of a CSV's values: g, m/s2, cm/s2 or m/s; default as in its header."),
 ]
 ColumnOption = Annotated[str | None, typer.Option(help="Column of a CSV, by its name.")]
 MotionFile = Annotated[Path, typer.Argument(help="Record: PEER .AT2, or CSV with a header.", metavar="FILE")]
 MotionOut = Annotated[Path, typer.Option(help="File to write, .AT2 or .csv.", callback=motion_to_write)]
-KindOption = Annotated[Kind, typer.Option(help="Where the motion is one of.")]
+KindOption = Annotated[Kind, typer.Option(help="Place for which the motion is given.")]
 
 
 @app.command()
@@ -66,8 +67,8 @@ def convert(
     unit: UnitOption = None,
     column: ColumnOption = None,
     pga: Annotated[float | None, typer.Option(help="Scale to this peak acceleration, g.")] = None,
-    low: Annotated[float | None, typer.Option(help="Take frequencies below this away, Hz.")] = None,
-    high: Annotated[float | None, typer.Option(help="Take frequencies above this away, Hz.")] = None,
+    low: Annotated[float | None, typer.Option(help="Remove frequencies below this, Hz.")] = None,
+    high: Annotated[float | None, typer.Option(help="Remove frequencies above this, Hz.")] = None,
 ) -> None:
     """Write a motion in another form, filtered and scaled if asked."""
     motion = Motion.from_file(file, unit=unit, column=column)
@@ -90,7 +91,7 @@ def deconvolve(
     at: Annotated[Place, typer.Option(help="At which end of the ground it stood.")] = "surface",
     curves: Annotated[CurveChoice, typer.Option(help="Stiffness and damping over strain.")] = "darendeli",
     linear: Annotated[bool, typer.Option("--linear", help="Keep the stiffness of small strain.")] = False,
-    max_frequency: Annotated[float | None, typer.Option(help="Take faster waves away, Hz.")] = None,
+    max_frequency: Annotated[float | None, typer.Option(help="Remove frequencies above this, Hz.")] = None,
 ) -> None:
     """Find the outcrop motion at the base of a scene from a record at its surface; print strains."""
     motion = Motion.from_file(file, unit=unit, column=column, kind=kind)
@@ -101,6 +102,6 @@ def deconvolve(
 
 
 def _write(motion: Motion, out: Path) -> None:
-    """Write a motion in the form that the file's ending tells."""
+    """Write a motion in the form given by the ending of the file."""
     write = motion.write_at2 if out.suffix.lower() == ".at2" else motion.write_csv
     write(out)

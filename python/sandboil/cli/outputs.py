@@ -23,10 +23,10 @@ PICTURES = (".png", ".pdf", ".svg")
 def to_write(parameter: typer.CallbackParam, path: Path | None) -> Path | None:
     """Refuse a file that cannot be written; for an option's callback."""
     if path is not None:
-        told = _obstacle(path)
-        if told is not None:
+        obstacle = _obstacle(path)
+        if obstacle is not None:
             raise InvalidInput(
-                parameter.opts[0], str(path), f"must be writable, but {told}", "name another file"
+                parameter.opts[0], str(path), f"must be writable, but {obstacle}", "name another file"
             )
     return path
 

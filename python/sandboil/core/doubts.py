@@ -10,9 +10,9 @@ from .motions import StageMotions
 if TYPE_CHECKING:
     from ..scene.scene import Scene
 
-# Velocity at the end of a motion over its peak beyond which it is told. The ground is then stopped within a
-# sample, by a wave of stress rho Vs v: up to this share it is lost in what the shaking itself does. Records
-# that were baseline corrected end far below.
+# Velocity at the end of a motion over its peak beyond which a run warns. The ground is then stopped within a
+# sample, by a wave of stress rho Vs v: up to this share it is small against the waves of the shaking itself.
+# Records that were baseline corrected end far below.
 RESIDUAL_VELOCITY = 0.02
 
 
@@ -43,8 +43,8 @@ def _of_residual_velocities(motions: StageMotions, path: str) -> list[str]:
         if abs(left) > RESIDUAL_VELOCITY * motion.pgv:
             found.append(
                 f"{path}.{place} ends with a velocity of {left:.3g} m/s, {abs(left) / motion.pgv:.0%} of "
-                f"its peak, and a drift of {motion.displacement[-1]:.3g} m: the ground is stopped with a "
-                "blow and stays displaced; motion.baseline_corrected() takes both away"
+                f"its peak, and a drift of {motion.displacement[-1]:.3g} m: the ground is stopped by a "
+                "shock and stays displaced; motion.baseline_corrected() removes both"
             )
     return found
 

@@ -1,4 +1,4 @@
-"""The motions of shaking stages, read and made upgoing waves."""
+"""The motions of shaking stages as upgoing waves."""
 
 from __future__ import annotations
 
@@ -77,10 +77,10 @@ def _stage_motions(scene: Scene, stage: Shaking, path: str) -> StageMotions:
             loaded[place] = spec.load()
             loaded[place].upgoing_velocity()
         except InvalidInput as error:
-            # A file's own place, line and all, follows the stage's.
+            # The place in a file follows the place in the stage.
             rest = error.path.removeprefix("motion")
-            told = rest if rest != error.path else f", {error.path}"
-            raise InvalidInput(f"{path}{place}{told}", error.value, error.allowed, error.hint) from None
+            inner = rest if rest != error.path else f", {error.path}"
+            raise InvalidInput(f"{path}{place}{inner}", error.value, error.allowed, error.hint) from None
     main, vertical = loaded.get("motion"), loaded.get("vertical")
     if main is not None and vertical is not None and not math.isclose(main.dt, vertical.dt):
         raise InvalidInput(

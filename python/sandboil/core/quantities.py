@@ -18,7 +18,7 @@ ACCELERATED_FLOW = "explicit with acceleration term"
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a stored quantity is: its unit and one line about it, with its sign."""
+    """Unit of a stored quantity, and one line that describes it, with its sign."""
 
     unit: str
     description: str
@@ -57,7 +57,7 @@ VECTOR_FIELDS = ("displacement", "velocity", "acceleration")
 # Fields of which the largest value over all steps can be kept.
 ENVELOPES = ("r_u", "gamma_max")
 
-# The core's history channels: the name here, and the factor that turns its tension positive into ours.
+# The core's history channels: the name here, and the factor from tension positive to compression positive.
 CHANNELS: dict[str, tuple[str, float]] = {
     "stress_xx": ("sigma_h_eff", -1.0),
     "stress_yy": ("sigma_v_eff", -1.0),
@@ -94,21 +94,21 @@ STRESS_HISTORIES = (
 # Names whose sum is the work of all constant forces.
 CONSTANT_FORCES = ("weight", "still_water", "reaction", "renewal_force", "load")
 
-# What is kept of energy and mass in a stage of shaking, in the core's order. Works count from its beginning.
+# Energies and masses of a stage of shaking, in the core's order. Works count from its beginning.
 ENERGY: dict[str, Quantity] = {
     "kinetic": Quantity("kJ/m", "kinetic energy"),
-    "stress": Quantity("kJ/m", "done on the soil by effective stress: stored, and lost in plasticity"),
-    "water": Quantity("kJ/m", "given to the pore water beyond its state at rest"),
-    "damping": Quantity("kJ/m", "taken by the velocity filter and Rayleigh damping"),
-    "local_damping": Quantity("kJ/m", "taken by local damping"),
+    "stress": Quantity("kJ/m", "work of effective stress on the soil: stored, and dissipated by plasticity"),
+    "water": Quantity("kJ/m", "work on the pore water beyond its state at rest"),
+    "damping": Quantity("kJ/m", "dissipated by the velocity filter and Rayleigh damping"),
+    "local_damping": Quantity("kJ/m", "dissipated by local damping"),
     "weight": Quantity("kJ/m", "work of the weight"),
     "still_water": Quantity("kJ/m", "work of the pore pressure at rest"),
     "reaction": Quantity("kJ/m", "work of the forces that balance the state at the start of the stage"),
     "renewal_force": Quantity("kJ/m", "work of the forces that balance renewed weights"),
     "load": Quantity("kJ/m", "work of loads"),
-    "base": Quantity("kJ/m", "brought in through the base, less what leaves there"),
-    "sides": Quantity("kJ/m", "brought in through free-field sides, less what leaves there"),
-    "renewal": Quantity("kJ/m", "kinetic energy gained where a renewed geometry changes masses"),
+    "base": Quantity("kJ/m", "inflow through the base, less outflow"),
+    "sides": Quantity("kJ/m", "inflow through free-field sides, less outflow"),
+    "renewal": Quantity("kJ/m", "kinetic energy gained where a renewal of the geometry changes masses"),
     "solid_mass": Quantity("Mg/m", "mass of the grains"),
     "water_mass": Quantity("Mg/m", "mass of water that fills the pores, as of the last geometry"),
 }

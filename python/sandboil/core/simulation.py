@@ -1,4 +1,4 @@
-"""Stepping a scene from Python: the numerical core, driven through its stages and read in users' terms."""
+"""Simulation of a scene: the numerical core, driven through the stages and read in users' terms."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ from .quantities import (
 if TYPE_CHECKING:
     from ..scene.scene import Scene
 
-# How long the core computes before it looks whether the user wants to stop, s.
+# Wall time after which the core checks for an interruption by the user, s.
 LOOK_INTERVAL = 0.1
 
-# Most threads: beyond, no section has work enough, and starting them takes longer than a run.
+# Most threads: with more, starting them takes longer than the work that they share.
 MAX_THREADS = 256
 
 # Names in :attr:`Simulation.fingerprints` beside those of the section's parts.
@@ -52,7 +52,7 @@ _NO_LIMIT = 2**62
 
 
 class Simulation:
-    """A scene under way, from its geostatic stress through its stages.
+    """The computation of a scene, from its geostatic stress through its stages.
 
     Arrays are copies, one row per node in the order of :func:`discretise` (row by row from the bottom).
 
@@ -60,7 +60,7 @@ class Simulation:
     ----------
     scene : what is computed
     threads : that share the work; results are the same bits for any number
-    columns : folder of a run that kept its free-field columns, which are read instead of solved again
+    columns : folder of a run that kept its free-field columns: they are read instead of computed
     keep_columns : whether to record the columns for :meth:`take_columns`
 
     Attributes
@@ -69,7 +69,7 @@ class Simulation:
     particles : the nodes and their geostatic state
     probes : where histories are taken
     threads : that share the work
-    motions : the motion of every stage, None where there is none; horizontal, and for all of the base
+    motions : the horizontal motion of every stage, for all of the base; None without one
     doubts : why an answer may not be what was meant; each is also warned of as :class:`SandboilWarning`
 
     Raises
@@ -106,7 +106,10 @@ class Simulation:
         if scene.seepage is not None and (columns is not None or keep_columns):
             name, value = ("columns", columns) if columns is not None else ("keep_columns", keep_columns)
             raise InvalidInput(
-                name, value, "does not go with a seepage stage: columns follow from its water", "leave it out"
+                name,
+                value,
+                "cannot be used with a seepage stage: columns depend on its water",
+                "leave it out",
             )
         self.threads = threads
         self._stages = [
@@ -199,7 +202,7 @@ class Simulation:
         return self.stage_is_complete and self._index == len(self.scene.stages) - 1
 
     def step(self, count: int = 1) -> int:
-        """Make `count` steps, going on to the next stage where one ends; returns how many were made."""
+        """Make `count` steps, beginning the next stage where one ends; returns how many were made."""
         made = 0
         while made < count and self._under_way():
             before = self._present.step
@@ -223,14 +226,14 @@ class Simulation:
         return done or self._present.time + 0.5 * self.dt >= until
 
     def _advance(self, steps: int, until: float, seconds: float) -> bool:
-        """Let the core go on with the present stage; returns whether that is over."""
+        """Let the core advance the present stage; returns whether the stage is complete."""
         done = self._present.advance(steps=steps, until=until, seconds=seconds)
         if done and isinstance(self._present, _core.Seepage):
-            self._tell_suction(self._present.pore_pressure())
+            self._warn_of_suction(self._present.pore_pressure())
         return done
 
-    def _tell_suction(self, pressure: Floats) -> None:
-        """Warn of a suction, of more than a spacing's height, in soil without a retention curve."""
+    def _warn_of_suction(self, pressure: Floats) -> None:
+        """Warn of a suction of more than one spacing's height in soil without a retention curve."""
         scene = self.scene
         assert scene.water is not None
         is_full = np.array([region.retention is None for region in scene.regions])[self.particles.region]
@@ -238,16 +241,16 @@ class Simulation:
         if not is_full[lowest] or pressure[lowest] >= -scene.spacing * scene.water.unit_weight:
             return
         x, y = self.particles.position[lowest]
-        told = (
+        message = (
             f"scene.stages[0] leaves a suction of {-pressure[lowest]:.3g} kPa at ({x:g}, {y:g}) m in region "
             f"{scene.regions[self.particles.region[lowest]].name!r}, which was computed as full: give "
             "it a retention curve, or draw less water out"
         )
-        self.doubts.append(told)
-        warnings.warn(told, SuctionWarning, stacklevel=4)
+        self.doubts.append(message)
+        warnings.warn(message, SuctionWarning, stacklevel=4)
 
     def store(self, path: str | os.PathLike[str], note: bytes = b"") -> None:
-        """Write all that the simulation is to a file, to go on from by :meth:`restore`, with a note.
+        """Write the whole state to a file with a note, so that :meth:`restore` can continue.
 
         Returns when the disk has it. Raises :class:`OSError` if it cannot.
         """
@@ -255,13 +258,13 @@ class Simulation:
 
     @property
     def can_be_stored(self) -> bool:
-        """Whether the present stage has a state to go on from: seepage is computed anew instead."""
+        """Whether the present stage can be stored. Seepage cannot: it is computed again."""
         return self._grains is not None
 
     def restore(self, path: str | os.PathLike[str], stage: str) -> None:
-        """Take over a state of this scene stored in a stage; it goes on bit for bit as it would have.
+        """Continue from a stored state of this scene, with the same bits as without the interruption.
 
-        Raises :class:`DamagedState` for a file that is not as it was written, :class:`InvalidInput` for one
+        Raises :class:`DamagedState` for a file whose bytes have changed, :class:`InvalidInput` for one
         of another section or another build, and :class:`OSError`.
         """
         index = self.scene.stage_names.index(stage)
@@ -274,28 +277,28 @@ class Simulation:
 
     @cached_property
     def fingerprints(self) -> dict[str, str]:
-        """What tells this scene from others: of each part of the section, each stage and the output."""
+        """Fingerprints that identify the scene: of each part of the section, each stage and the output."""
         stages = (
             stage.model_dump() if described is None else described
             for stage, described in zip(self.scene.stages, self._stages, strict=True)
         )
         return {
-            **{name: fingerprint(said) for name, said in self._section.items()},
+            **{name: fingerprint(described) for name, described in self._section.items()},
             **{
-                STAGE_PREFIX + name: fingerprint(said)
-                for name, said in zip(self.scene.stage_names, stages, strict=True)
+                STAGE_PREFIX + name: fingerprint(described)
+                for name, described in zip(self.scene.stage_names, stages, strict=True)
             },
             OUTPUT: fingerprint(self.scene.output.model_dump()),
         }
 
     def begin_next_stage(self) -> None:
-        """Leave the present stage as it stands and begin the next one."""
+        """End the present stage in its present state and begin the next one."""
         if self._index + 1 == len(self.scene.stages):
             raise SandboilError(f"{self.stage!r} is the last stage")
         self._begin_next_stage()
 
     def _under_way(self) -> bool:
-        """Whether there is a step to make, after going on to the next stage where one has ended."""
+        """Begin the next stage if the present one is complete; returns whether steps remain."""
         if self.stage_is_complete and not self.is_complete:
             self._begin_next_stage()
         return not self.stage_is_complete
@@ -316,7 +319,7 @@ class Simulation:
             self._grains.begin_shaking(description)
 
     def _with_water_of_seepage(self) -> dict[str, Any]:
-        """The section at rest with the water that its seepage stage has left."""
+        """The section at rest with the water at the end of its seepage stage."""
         assert self._water is not None
         pressure, saturation = self._water.pore_pressure(), self._water.saturation()
         self.particles = self.particles.with_pore_water(pressure, saturation)
@@ -324,22 +327,22 @@ class Simulation:
 
     @property
     def _present(self) -> _core.Simulation | _core.Seepage:
-        """What computes the present stage."""
+        """The part of the core that computes the present stage."""
         present = self._water if self._grains is None else self._grains
         assert present is not None
         return present
 
     @property
     def _moving(self) -> _core.Simulation:
-        """The grains, in stages in which they may move."""
+        """The grains; refused in a seepage stage, which has none."""
         if self._grains is None:
-            raise SandboilError(f"{self.stage!r} does not look at the grains")
+            raise SandboilError(f"{self.stage!r} is computed without the grains")
         return self._grains
 
     def _use_columns(
         self, section: dict[str, Any], read: str | os.PathLike[str] | None, keep: bool
     ) -> list[tuple[str, str, str]]:
-        """Stage, side and fingerprint of every free-field column; stages are told which to read and keep."""
+        """Stage, side and fingerprint of every free-field column; prepares what is read and recorded."""
         if read is None and not keep:
             return []
         stages = dict(zip(self.scene.stage_names, self._stages, strict=True))
@@ -353,7 +356,10 @@ class Simulation:
         if not keys:
             name, value = ("columns", str(read)) if read is not None else ("keep_columns", keep)
             raise InvalidInput(
-                name, value, "goes with free-field sides, of which the scene has none", "leave it out"
+                name,
+                value,
+                "needs a shaking stage beside free-field sides; this scene has none",
+                "leave it out",
             )
         found = {} if read is None else load_columns(Path(read), keys)
         for name, stage in stages.items():
@@ -369,16 +375,16 @@ class Simulation:
             return []
         records = dict(zip(HANDS, self._grains.take_column_records(), strict=True))
         return [
-            (stage, hand, fingerprint, ColumnRecord.of_core(told))
+            (stage, hand, fingerprint, ColumnRecord.of_core(record))
             for stage, hand, fingerprint in self._columns
-            if stage == self.stage and (told := records[hand]) is not None
+            if stage == self.stage and (record := records[hand]) is not None
         ]
 
     # Reading
 
     @property
     def field_names(self) -> list[str]:
-        """Names that :meth:`field` knows in this scene."""
+        """Names for :meth:`field` in this scene."""
         return list(SEEPAGE_FIELDS) if self._grains is None else moving_fields(self.scene)
 
     def field(self, name: str) -> Floats:
@@ -406,7 +412,7 @@ class Simulation:
         core, particles = self._grains, self.particles
         excess = core.excess_pore_pressure()
         stress, strain = core.stress(), core.strain()
-        # The out-of-plane stress is left out: PM4Sand does not use it, and nothing keeps it physical.
+        # The out-of-plane stress is left out: PM4Sand does not use it, so it may be unphysical.
         sigma_h, sigma_v, tau = (stress.mean(axis=1)[:, :3] * (-1.0, -1.0, 1.0)).T
         values: dict[str, Floats] = {
             "displacement": core.displacement(),
@@ -444,13 +450,13 @@ class Simulation:
         else:
             excess = self._grains.largest_excess_pore_pressure()
             largest = None if excess is None else pore_pressure_ratio(excess, self.particles.sigma_v_eff0)
-        # The core looks at the beginning of every step: the present state is not among them yet.
+        # The core updates at the beginning of every step, so the present state is not included yet.
         return None if largest is None else np.maximum(largest, self.field(name))
 
     def take_histories(self) -> tuple[Floats, dict[str, Floats]]:
         """History samples finished since the last call: times (m,) in s, and (m, probes) by name.
 
-        They have gone through a low-pass filter before thinning. Empty outside a shaking stage.
+        They are low-pass filtered before thinning. Empty outside a shaking stage.
         """
         if self._grains is None:
             return np.empty(0), {}
@@ -472,7 +478,7 @@ class Simulation:
         return time, dict(zip(_core.ENERGY_NAMES, values.T, strict=True)) if len(time) else {}
 
     def finish_histories(self) -> None:
-        """Close the samples still collecting: the run ends here, before its stage does."""
+        """Close the last samples where a run ends before its stage."""
         if self._grains is not None:
             self._grains.finish_histories()
 
@@ -537,19 +543,19 @@ class Simulation:
         return self._water.outlets(condition)
 
     def arrays(self) -> dict[str, int]:
-        """Bytes of the core's arrays by name; what the scene does not ask for is not there."""
+        """Bytes of the core's arrays by name; only those that the scene needs exist."""
         return dict(self._present.arrays())
 
     def counters(self) -> dict[str, int]:
-        """Work done in the present stage, by kind: steps, calls, and every guard that acted.
+        """Counts of the present stage: steps, calls, and every guard that acted.
 
         `porosity_clips` counts porosities kept in the range of a packing, `edge_contacts` times that a
-        particle of flowing ground was stopped at base or side, `inadmissible_starts` stresses at rest that
-        the soil of shaking could not carry, `pressure_floors` stresses held at the soil's least pressure,
-        `bounding_caps` those taken back to PM4Sand's bounding surface, `tension_cutoffs` and `apex_returns`
+        particle of a run-out was stopped at base or side, `inadmissible_starts` stresses at rest that
+        shaken soil cannot carry, `pressure_floors` stresses held at the soil's least pressure,
+        `bounding_caps` those returned to PM4Sand's bounding surface, `tension_cutoffs` and `apex_returns`
         updates that ended at a cut-off of tension or at an apex, `forced_acceptances` parts of a step taken
         at the smallest size although their error was above the tolerance, `reversals` updates of a soil's
-        reference stress, of which `near_neutral_reversals` might fall otherwise with other steps.
+        reference stress, of which `near_neutral_reversals` could differ with other steps.
         Seepage has its own, `seepage_...`.
         """
         if self._grains is not None:

@@ -36,7 +36,7 @@ class CommittedFile(io.RawIOBase):
     Parameters
     ----------
     path : of the file; its folder exists
-    exists : whether to go on with a file that is there; else there must be none
+    exists : whether to continue a file that exists; else there must be none
 
     Raises :class:`OSError` as files do.
     """

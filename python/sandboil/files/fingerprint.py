@@ -1,4 +1,4 @@
-"""Telling whether two descriptions are the same, of which one is no longer there."""
+"""Fingerprints of descriptions, to compare one with another that no longer exists."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 
-def fingerprint(said: Any) -> str:
-    """SHA-256 of what is said by dictionaries, sequences, numbers, texts and arrays."""
-    text = json.dumps(said, sort_keys=True, default=_of_array)
+def fingerprint(description: Any) -> str:
+    """SHA-256 of a description of dictionaries, sequences, numbers, texts and arrays."""
+    text = json.dumps(description, sort_keys=True, default=_of_array)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -1,4 +1,4 @@
-"""HDF5 files of ours that come back from a user's disk: whatever is wrong with one is told as bad input."""
+"""HDF5 files of sandboil read from a user's disk: every fault of a file is reported as bad input."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _MAX_EXPANSION = 1032
 # Most groups and arrays of a file: a run of many stages has hundreds, and a group may hold itself.
 _MAX_PLACES = 10_000
 
-# Layout of what we write, of HDF5 1.10: it sums up what it says of itself, so that damage is found before it
-# is believed, which older layouts let hang or break the library.
+# Layout of what we write, of HDF5 1.10. Its metadata have checksums, so that damage is found before it is
+# used; in older layouts damage can hang or crash the library.
 LAYOUT = ("v110", "v110")
 
 
@@ -30,12 +30,12 @@ def text(value: str) -> NDArray[np.bytes_]:
     return np.array(content, dtype=h5py.string_dtype("utf-8", max(len(content), 1)))
 
 
-def said(value: Any) -> str:
+def text_of(value: Any) -> str:
     """The text of an attribute."""
-    told = value.decode() if isinstance(value, bytes) else value
-    if not isinstance(told, str):
+    content = value.decode() if isinstance(value, bytes) else value
+    if not isinstance(content, str):
         raise ValueError(f"an attribute is {type(value).__name__} and no text")
-    return told
+    return content
 
 
 @contextmanager
@@ -47,19 +47,19 @@ def opened(path: Path, label: str) -> Iterator[h5py.File]:
     except SandboilError:
         raise
     except (OSError, KeyError, ValueError, TypeError, AttributeError, IndexError, RuntimeError) as error:
-        # What h5py raises for a damaged file, and what comes of a value that is not of its kind.
+        # What h5py raises for a damaged file, and what follows from a value of another type.
         raise InvalidInput(
             label,
             str(path),
             f"must be a sound file of sandboil: {error}",
-            "take a copy, or run the scene anew",
+            "take a copy, or run the scene again",
         ) from error
 
 
 def refuse_foreign(file: h5py.File, label: str) -> None:
     """Refuse a file that refers to others, or whose arrays are larger than what it holds can be unpacked to.
 
-    The first would be read and, when a run is resumed, written with it; the second fill the memory.
+    Other files would be read and, when a run is resumed, written; larger arrays fill the memory.
     """
     room = _MAX_EXPANSION * Path(file.filename).stat().st_size
     groups, count = [file], 0
@@ -67,14 +67,14 @@ def refuse_foreign(file: h5py.File, label: str) -> None:
         group = groups.pop()
         for name in group:
             count += 1
-            told = (
+            fault = (
                 _foreign(group, name, room) if count <= _MAX_PLACES else f"it has over {_MAX_PLACES} places"
             )
-            if told is not None:
+            if fault is not None:
                 raise InvalidInput(
                     label,
                     file.filename,
-                    f"must hold its own arrays alone, but {told}",
+                    f"must hold its own arrays alone, but {fault}",
                     "take a copy of the run",
                 )
             if group.get(name, getclass=True) is h5py.Group:
@@ -82,7 +82,7 @@ def refuse_foreign(file: h5py.File, label: str) -> None:
 
 
 def _foreign(group: h5py.Group, name: str, room: int) -> str | None:
-    """What a file does not hold itself at a place; None if all is well."""
+    """What is wrong at a place of a file; None if it holds an array or a group of its own."""
     place = f"{group.name.rstrip('/')}/{name}"
     if not isinstance(group.get(name, getlink=True), h5py.HardLink):
         return f"{place} is a link to elsewhere"
@@ -93,4 +93,4 @@ def _foreign(group: h5py.Group, name: str, room: int) -> str | None:
         return f"{place} is no array"
     if item.external or item.is_virtual:
         return f"{place} lies in another file"
-    return f"{place} says that it has {item.nbytes} bytes" if item.nbytes > room else None
+    return f"{place} declares {item.nbytes} bytes" if item.nbytes > room else None

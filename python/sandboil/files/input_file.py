@@ -1,4 +1,4 @@
-"""Files that a user hands over: read whole and bounded, and refused as any other input is."""
+"""Input files of a user, read whole up to a largest size."""
 
 from __future__ import annotations
 

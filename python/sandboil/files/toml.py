@@ -1,4 +1,4 @@
-"""TOML from and to a user: what is read is refused as any other input is."""
+"""TOML files of a user, read and written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the scene to particles, and the geostatic stress and water pressure they start from."""
+"""The particles of a scene, and their geostatic stress and water pressure."""
 
 from __future__ import annotations
 
@@ -104,8 +104,8 @@ class Overburden:
         x0, y0, x1, y1 = self.bounds
         beyond = x0 + np.mod(x - x0, x1 - x0) if self.is_periodic else np.clip(x, x0, x1)
         inside = np.where((x < x0) | (x > x1), beyond, x)
-        # A vertical along an upright edge would count the soils on both of its sides: it is moved off it,
-        # to the right, or from the right side of the section to the left.
+        # A vertical along an upright edge would count the soils on both of its sides: it is moved to the
+        # right, or at the right side of the section to the left.
         corners = np.unique(shapely.get_coordinates(self.outlines)[:, 0])
         near = corners[np.minimum(np.searchsorted(corners, inside - COORDINATE_TOLERANCE), len(corners) - 1)]
         on_edge = np.abs(near - inside) <= COORDINATE_TOLERANCE
@@ -120,7 +120,7 @@ class Overburden:
 
 @dataclass(frozen=True)
 class PoreWater:
-    """Pressure and saturation of nodes, read between them: heads and saturations are the nearest node's.
+    """Pressure and saturation of nodes. Between them heads and saturations are those of the nearest node.
 
     Attributes
     ----------
@@ -176,7 +176,7 @@ class PoreWater:
 
     def _nearest(self, points: Floats) -> tuple[NDArray[np.intp], Floats]:
         """The node nearest to each point, and how far above the point it lies, m."""
-        # Imported by those who need it: it costs a quarter of a second.
+        # Imported where it is used: that takes a quarter of a second.
         from scipy.spatial import cKDTree
 
         _, nearest = cKDTree(self.position).query(points)

@@ -1,4 +1,4 @@
-"""The edges of a section: its base, its two sides, and the ground surface, which is all the rest."""
+"""The edges of a section: its base, its two sides, and the ground surface between the sides."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _run(is_on: NDArray[np.bool_]) -> int:
 
 
 def _without_idle_corners(line: Floats) -> Floats:
-    """The same line without the corners at which it goes straight on, as where two regions meet."""
+    """The same line without corners at which it does not turn, as where two regions meet."""
     corners: Floats = shapely.get_coordinates(
         shapely.simplify(shapely.LineString(line), COORDINATE_TOLERANCE)
     )
@@ -104,11 +104,11 @@ def _refuse_overhang(base: Floats) -> None:
     back = np.flatnonzero(np.diff(base[:, 0]) <= COORDINATE_TOLERANCE)
     if len(back):
         (xa, ya), (xb, yb) = base[back[0]], base[back[0] + 1]
-        told = "is upright" if abs(xb - xa) <= COORDINATE_TOLERANCE else "turns back"
+        fault = "is upright" if abs(xb - xa) <= COORDINATE_TOLERANCE else "turns back"
         raise InvalidInput(
             "scene.regions",
             [(float(xa), float(ya)), (float(xb), float(yb))],
             "must stand on a base that runs from the left end of the section to the right one, but it "
-            f"{told} from ({xa:g}, {ya:g}) to ({xb:g}, {yb:g})",
-            "give a step of the base a slope, and fill what hangs over or below the base",
+            f"{fault} from ({xa:g}, {ya:g}) to ({xb:g}, {yb:g})",
+            "give a step of the base a slope, and fill overhangs and gaps below the base",
         )

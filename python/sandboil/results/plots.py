@@ -1,7 +1,7 @@
-"""Pictures of a run: seepage, and what happened at the surface, to the water, over depth, and in the soil.
+"""Pictures of a run: seepage, and the motion of the surface, pore pressure, the column, and the soil.
 
 Every function gives a matplotlib figure; :func:`plot` writes them all. Another code's results in CSV may be
-laid over them; the columns are told in :class:`Reference`.
+drawn over them; :class:`Reference` lists the columns.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ _SWAY_SHARE = 0.6
 
 @dataclass(frozen=True)
 class Reference:
-    """Results of another code, to be laid over a run's, from a folder of CSV files with a header each.
+    """Results of another code, drawn over those of a run, from a folder of CSV files with a header each.
 
     ``histories.csv``: time_s, acc_surface_g, and ru_<depth>m for any depths (4 m: ru_4m).
     ``spectrum.csv``: period_s and psa_surface_g_5pct.
     ``stress_strain.csv``: time_s, and tau_kPa_<depth>m, sv_eff_kPa_<depth>m, gamma_<depth>m.
-    Compression positive, time 0 at the start of the record. Columns beyond these are passed over.
+    Compression positive, time 0 at the start of the record. Other columns are ignored.
     """
 
     histories: dict[str, Floats]
@@ -106,7 +106,7 @@ def plot(
     Parameters
     ----------
     folder : where to; default `plots` in the run's own
-    reference : results of another code to lay over
+    reference : results of another code to draw over those of the run
     stage : a stage in which the ground moves, default the last
 
     Raises
@@ -171,7 +171,7 @@ def _is_run_out(run: Run, stage: str) -> bool:
 
 
 def run_out(run: Run, *, stage: str | None = None) -> Figure:
-    """Ground that flows: where it began, where it moved fastest, and where it came to."""
+    """A run-out: the ground at the beginning, when it moved fastest, and at the end."""
     stage = _shaken_stage(run, stage)
     history, times = run.energy(stage), run.frame_times(stage)
     fastest = float(history["time"][np.argmax(history["kinetic"])])
@@ -185,7 +185,7 @@ def run_out(run: Run, *, stage: str | None = None) -> Figure:
     if not wet:
         values = [np.hypot(velocity[:, 0], velocity[:, 1]) for velocity in values]
     low, top = (extreme(value) for extreme, value in ((np.min, values), (np.max, values)))
-    # Grains that fly ahead of the front leave the picture rather than shrink it.
+    # Particles far ahead of the front are outside the picture, which would otherwise shrink.
     front = np.quantile(moved[-1][:, 0], (0.002, 0.998))
     left, right = min(x0, float(front[0])), max(x1, float(front[1]))
     bottom, height = outline.base[:, 1].min(), np.ptp(edge[:, 1])
@@ -204,7 +204,7 @@ def run_out(run: Run, *, stage: str | None = None) -> Figure:
 
 
 def seepage(run: Run) -> Figure:
-    """Where a seepage stage has brought the water: heads, phreatic line, saturation, and discharges."""
+    """The water at the end of a seepage stage: heads, phreatic line, saturation, and discharges."""
     from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.patches import Polygon as Patch
     from matplotlib.ticker import MaxNLocator
@@ -246,9 +246,9 @@ def seepage(run: Run) -> Figure:
     entering = sum(max(inflow, 0.0) for _, inflow in run.discharge)
     when = "steady state" if stage.duration is None else f"after {time:.4g} s"
     figure.suptitle(f"seepage, {when}: {entering:.3g} m$^3$/s per m enter", fontsize=9)
-    told = "discharges are positive where water comes in"
-    figure.legend(loc="outside lower center", ncols=2, fontsize=7, title=told, title_fontsize=7)
-    # The layout knows the room that tick labels take only once they have been drawn.
+    title = "discharges are positive where water comes in"
+    figure.legend(loc="outside lower center", ncols=2, fontsize=7, title=title, title_fontsize=7)
+    # The layout needs the sizes of tick labels, which are known after a first drawing.
     figure.draw_without_rendering()
     return figure
 
@@ -266,9 +266,9 @@ def _size_of(run: Run, conditions: int) -> tuple[float, float]:
 def _raster(run: Run, values: Floats) -> tuple[Floats, Floats, Floats]:
     """x (m,), y (n,) and values (n, m) of a field of the nodes on a fine lattice; nan outside the section.
 
-    It goes on to the edges, which no node reaches.
+    It extends to the edges, which no node reaches.
     """
-    # Imported by those who need it: it costs a quarter of a second.
+    # Imported where it is used: that takes a quarter of a second.
     from scipy.interpolate import RBFInterpolator
 
     x0, y0, x1, y1 = run.scene.bounds
@@ -279,7 +279,7 @@ def _raster(run: Run, values: Floats) -> tuple[Floats, Floats, Floats]:
     # Half a cell more, so that lines are cut by the edge itself.
     reach = shapely.buffer(run.scene.section, 0.5 * run.scene.spacing)
     inside = shapely.intersects_xy(reach, points[..., 0], points[..., 1])
-    # Without a linear part, which a single column of nodes could not tell.
+    # Without a linear part, which a single column of nodes does not determine.
     field = RBFInterpolator(run.position, values, neighbors=_NEIGHBOURS, kernel="linear", degree=0)
     raster[inside] = field(points[inside])
     return x, y, raster
@@ -372,7 +372,7 @@ def column(run: Run, *, stage: str | None = None) -> Figure:
 
 
 def section(run: Run, *, stage: str | None = None) -> Figure:
-    """The section where its soil went: outline at rest, and displacement of every particle at the end."""
+    """The section: outline at rest, and displacement of every particle at the end."""
     stage = _shaken_stage(run, stage)
     outline, (x0, y0, x1, y1) = run.scene.outline, run.scene.bounds
     displacement = run.field("displacement", stage=stage)
@@ -389,13 +389,13 @@ def section(run: Run, *, stage: str | None = None) -> Figure:
     axes.plot(*np.array([(p.x, p.y) for p in run.probes]).T, "k+", ms=6.0, label="histories")
     axes.set(xlabel="x, m", ylabel="y, m", aspect="equal")
     axes.set_title(f"displacement at {run.frame_times(stage)[-1]:.4g} s", loc="left", fontsize=9)
-    # Above the frame: a section may fill any corner of it.
+    # Above the frame, since a section may fill any of its corners.
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=7)
     return figure
 
 
 def energy(run: Run, *, stage: str | None = None) -> Figure:
-    """What energy came into the section, and where it went, over time; kinds that stay zero are left out."""
+    """Energy that entered the section, and its use, over time; kinds that stay zero are left out."""
     stage = _shaken_stage(run, stage)
     history = run.energy(stage)
     figure = new_figure(8.0, 4.5)
@@ -403,7 +403,7 @@ def energy(run: Run, *, stage: str | None = None) -> Figure:
     taken = "velocity filter and Rayleigh damping"
     if _is_run_out(run, stage):
         taken = "velocity filter, viscosity and edges"
-    # Gravity's work and the stress at rest that carries it cancel, and would dwarf all else.
+    # The work of gravity and that of the stress at rest cancel; alone they are far larger than the rest.
     parts = {
         "came in": history["base"] + history["sides"],
         "motion": history["kinetic"],
@@ -420,7 +420,7 @@ def energy(run: Run, *, stage: str | None = None) -> Figure:
     return figure
 
 
-def neighbourhood(place: Floats, speed: Floats, stress: Floats, told: str, path: Path) -> None:
+def neighbourhood(place: Floats, speed: Floats, stress: Floats, title: str, path: Path) -> None:
     """Draw the nodes around the first of `place` (n, 2), m, where a run diverged, into a PNG.
 
     With their speed (m/s, n) and vertical effective stress (kPa, n); values that are not finite are crosses.
@@ -432,7 +432,7 @@ def neighbourhood(place: Floats, speed: Floats, stress: Floats, told: str, path:
         labels = ("speed, m/s", "vertical effective stress, kPa")
         for axes, values, label in zip(panels, (speed, stress), labels, strict=True):
             finite = np.isfinite(values)
-            # A runaway spans decades, and its neighbours shall be seen beside it.
+            # Diverging values span decades; a logarithmic scale shows their neighbours, too.
             norm = "log" if values is speed and np.any(speed[finite] > 0.0) else "linear"
             image = axes.scatter(*place[finite].T, c=values[finite], norm=norm, cmap="viridis", s=60.0)
             figure.colorbar(image, ax=axes, label=label)
@@ -441,7 +441,7 @@ def neighbourhood(place: Floats, speed: Floats, stress: Floats, told: str, path:
             (x, y), reach = place[0], 1.1 * np.abs(place - place[0]).max()
             axes.set(xlim=(x - reach, x + reach), ylim=(y - reach, y + reach), aspect="equal")
             axes.set(xlabel="x at rest, m", ylabel="y at rest, m")
-        figure.suptitle(told, fontsize=9)
+        figure.suptitle(title, fontsize=9)
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
         figure.savefig(path, dpi=DPI)
 

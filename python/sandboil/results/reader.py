@@ -28,7 +28,7 @@ from ..core.quantities import (
     pore_pressure_ratio,
     written_fields,
 )
-from ..files.hdf5 import opened, refuse_foreign, said
+from ..files.hdf5 import opened, refuse_foreign, text_of
 from ..motion import Kind, Motion, ResponseSpectrum, response_spectrum
 from ..motion._series import STANDARD_GRAVITY
 from ..scene.scene import Scene
@@ -74,12 +74,12 @@ class Run:
     scene : as it was computed, with every default written out
     status : "complete", "interrupted", "stopped" (by itself; see `message`), or "running" (also if killed)
     message : why the run ended early, else empty
-    resumed : how often the run was gone on with after it had ended early
-    fingerprints : what tells the scene from others, see :attr:`Simulation.fingerprints`
+    resumed : how often the run was resumed
+    fingerprints : identify the scene, see :attr:`Simulation.fingerprints`
     accuracy : the preset asked for
     versions : of what wrote the file
     revision : of the sources in git, with "+changes" if they had some; empty of a build outside a checkout
-    machine : what computed the run first: `threads`, `system`, `processor`, `processors`, `python_version`
+    machine : on which the run was begun: `threads`, `system`, `processor`, `processors`, `python_version`
     probes : points of the histories
     position : (n, 2) initial places of the nodes, m
     """
@@ -95,13 +95,13 @@ class Run:
             self._refuse_other_version(file)
             attributes = file.attrs
             self.scene = Scene.from_toml(file[SCENE.path].asstr()[0])
-            self.status = cast(Status, said(attributes[Root.STATUS]))
-            self.message = said(attributes[Root.MESSAGE])
+            self.status = cast(Status, text_of(attributes[Root.STATUS]))
+            self.message = text_of(attributes[Root.MESSAGE])
             self.resumed = int(attributes[Root.RESUMED])
-            self.fingerprints: dict[str, str] = json.loads(said(attributes[Root.FINGERPRINTS]))
-            self.accuracy = said(attributes[Root.ACCURACY])
-            self.versions = {name: said(attributes[Root.version(name)]) for name in Root.VERSIONED}
-            self.revision = said(attributes.get(Root.REVISION, ""))
+            self.fingerprints: dict[str, str] = json.loads(text_of(attributes[Root.FINGERPRINTS]))
+            self.accuracy = text_of(attributes[Root.ACCURACY])
+            self.versions = {name: text_of(attributes[Root.version(name)]) for name in Root.VERSIONED}
+            self.revision = text_of(attributes.get(Root.REVISION, ""))
             self.machine = _machine(file)
             labels, places = file[Probes.LABEL.path].asstr()[:], file[Probes.POSITION.path][:]
             self.probes = [Probe(label, *place) for label, place in zip(labels, places.tolist(), strict=True)]
@@ -123,7 +123,7 @@ class Run:
                 f"{self.path}.{Root.FORMAT_VERSION}",
                 version,
                 f"must be {FORMAT_VERSION}, the layout of this version of sandboil",
-                "read it with the sandboil that wrote it, or run the scene anew",
+                "read it with the sandboil that wrote it, or run the scene again",
             )
 
     @contextmanager
@@ -144,10 +144,10 @@ class Run:
 
     @property
     def history_names(self) -> list[str]:
-        """Names that :meth:`history` knows in this run; stresses and strains need `output.stress_paths`."""
-        spared = set() if self.scene.water is not None else set(WATER_FIELDS)
-        spared |= set() if self.scene.output.stress_paths else set(STRESS_HISTORIES)
-        return [name for name in HISTORIES if name not in spared]
+        """Names for :meth:`history` in this run; stresses and strains need `output.stress_paths`."""
+        absent = set() if self.scene.water is not None else set(WATER_FIELDS)
+        absent |= set() if self.scene.output.stress_paths else set(STRESS_HISTORIES)
+        return [name for name in HISTORIES if name not in absent]
 
     def has_histories(self, stage: str) -> bool:
         """Whether a stage has at least two samples of histories."""
@@ -227,9 +227,9 @@ class Run:
                 = kinetic at the beginning + weight + still_water + reaction + renewal_force + load
                 + base + sides + renewal
 
-        `sandboil.core.quantities.ENERGY` describes each. `damping` is what the forces of the skeleton take
-        beyond the work of its stress: without velocity filter and Rayleigh damping it is the error of the
-        balance. With corrected inertia it holds what that stores, with printed operators what they lose.
+        `sandboil.core.quantities.ENERGY` describes each. `damping` is the work of the forces of the skeleton
+        beyond that of its stress: without velocity filter and Rayleigh damping it is the error of the
+        balance. It includes the energy stored by corrected inertia, and the losses of printed operators.
         """
         stage = self._stage(stage)
         with self._open() as file:
@@ -249,7 +249,7 @@ class Run:
             given: dict[str, Any] = {quantity: samples[:]}
             return Motion(
                 dt=float(samples.attrs[Motions.DT]),
-                kind=cast(Kind, said(samples.attrs[Motions.KIND])),
+                kind=cast(Kind, text_of(samples.attrs[Motions.KIND])),
                 **given,
             )
 
@@ -273,7 +273,7 @@ class Run:
 
     @property
     def field_names(self) -> list[str]:
-        """Names that :meth:`field` knows in this run."""
+        """Names for :meth:`field` in this run."""
         return written_fields(self.scene)
 
     @property
@@ -311,9 +311,7 @@ class Run:
     def _frames_of(self, stage: str) -> npt.NDArray[np.intp]:
         frames = np.flatnonzero(self._frame_stage == self.scene.stage_names.index(stage))
         if not len(frames):
-            raise InvalidInput(
-                "stage", stage, "holds no field of its own", "its end is the beginning of the next stage"
-            )
+            raise InvalidInput("stage", stage, "has no frames", "its end is the beginning of the next stage")
         return frames
 
     def _frame(self, time: Time, stage: str) -> int:
@@ -406,7 +404,7 @@ class Run:
 
     @property
     def water_balance(self) -> tuple[list[float], float] | None:
-        """Inflow through each condition in all the seepage stage, and gain of stored water, m3 per m.
+        """Inflow through each condition over the whole seepage stage, and gain of stored water, m3 per m.
 
         None without a seepage stage of some duration: a steady state stores nothing.
         """
@@ -434,15 +432,16 @@ class Run:
     # Summing up
 
     def summary(self) -> Summary:
-        """What an engineer asks first, as a dict that prints as text."""
+        """Key figures as a dict that prints as text."""
         return summary_of(self)
 
     def accounts(self, stage: str | None = None) -> dict[str, Any]:
-        """Steps, wall time (s), counters and the like of a stage, as stored with it."""
+        """Steps, wall time (s) and counters of a stage, as stored with it."""
         with self._open() as file:
             accounts = file[Stage.path(self._stage(stage))].attrs
             return {
-                name: said(value) if isinstance(value, bytes) else value for name, value in accounts.items()
+                name: text_of(value) if isinstance(value, bytes) else value
+                for name, value in accounts.items()
             }
 
     def time_steps(self, stage: str | None = None) -> tuple[Floats, list[str]]:
@@ -482,5 +481,5 @@ def _machine(file: h5py.File) -> dict[str, Any]:
     """The attributes of the machine; none of a file without them."""
     attributes = file[Machine.GROUP].attrs if Machine.GROUP in file else {}
     return {
-        name: int(value) if name in Machine.NUMBERS else said(value) for name, value in attributes.items()
+        name: int(value) if name in Machine.NUMBERS else text_of(value) for name, value in attributes.items()
     }

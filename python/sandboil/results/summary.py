@@ -15,8 +15,8 @@ from .records import interval_of
 if TYPE_CHECKING:
     from .reader import Run
 
-# Corner of the low-pass under which surface accelerations of different codes agree, Hz, and its order: peaks
-# above it are single dilation spikes that depend on mesh and time step.
+# Corner, Hz, and order of the low-pass filter below which surface accelerations of different codes agree:
+# peaks above it are single dilation spikes that depend on mesh and time step.
 PGA_CORNER = 10.0
 PGA_ORDER = 4
 

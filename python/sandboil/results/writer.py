@@ -319,7 +319,7 @@ class Writer:
 
 
 def _processor() -> str:
-    """Name of the processor, as far as the system tells."""
+    """Name of the processor; empty where the system does not give it."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -339,12 +339,12 @@ def holds(path: Path, mark: dict[str, Any]) -> bool:
 
 
 def repair(path: Path) -> None:
-    """Put the twin of a results file in its place if it cannot be read and the twin can, and tell."""
+    """Replace a results file that cannot be read by its twin if that can be read, and warn."""
     nothing: dict[str, Any] = {"names": [], "rows": {}}
     twin = twin_of(path)
     if not holds(path, nothing) and holds(twin, nothing):
         warnings.warn(
-            f"{path} cannot be read; its second copy is taken, which may be some frames shorter",
+            f"{path} cannot be read; its second copy is used, which may be some frames shorter",
             ResumeWarning,
             stacklevel=3,
         )

@@ -1,8 +1,8 @@
-"""States of a run kept beside its results, from which it is gone on with.
+"""States of a run kept beside its results, from which it can continue.
 
-The folder `checkpoints` holds the last two states of a run under way, `000012.state`, and that of the end of
-every stage, `gravity.state`, from which other runs can start. Each is written whole under another name,
-brought to the disk and renamed, and carries a note of what it is a state of.
+The folder `checkpoints` holds the last two states of an unfinished run, `000012.state`, and that at the end
+of every stage, `gravity.state`, from which other runs can start. Each is written whole under another name,
+flushed to the disk and renamed, and has a note that identifies it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FOLDER_NAME = "checkpoints"
 _SUFFIX = ".state"
 _UNFINISHED = ".part"
 
-# How many states of a run under way are kept: the one before stands in for a newest one that is damaged.
+# How many states of an unfinished run are kept: the one before replaces a newest one that is damaged.
 _KEPT = 2
 
 # Wall time between checkpoints, s: five minutes of work are lost at most, for some tenths of a second each.
@@ -37,17 +37,17 @@ SECONDS = 300.0
 
 @dataclass(frozen=True)
 class Note:
-    """What a stored state is a state of, and what has to be known beside it to go on.
+    """Identity of a stored state, and what a run needs besides it to continue.
 
     Attributes
     ----------
     number : of the state in its run; later ones are higher
-    stage, time, step : where the run stood, s
+    stage, time, step : of the run at that moment, s
     is_end : whether the stage was at its end
     target : time of the next frame, s; infinite if there is none before the end
     wall_time : spent on the stage, s
-    fingerprints : of everything in the scene that has a say, as :attr:`Simulation.fingerprints`
-    results : what the results file held, as :meth:`Writer.mark`
+    fingerprints : of the scene, as :attr:`Simulation.fingerprints`
+    results : extent of the results file, as :meth:`Writer.mark`
     """
 
     number: int
@@ -66,14 +66,14 @@ class Note:
 
 @dataclass(frozen=True)
 class Stored:
-    """A state in a file, found sound."""
+    """A sound state in a file."""
 
     path: Path
     note: Note
 
 
 def refuse_intervals(seconds: float | None, interval: float | None) -> None:
-    """Refuse times between states, as of :class:`Keeper`, that are none."""
+    """Refuse times between states, as of :class:`Keeper`, that are not positive."""
     for name, value in (("checkpoint_seconds", seconds), ("checkpoint_time", interval)):
         if value is not None and not 0.0 < value < math.inf:
             raise InvalidInput(
@@ -82,14 +82,14 @@ def refuse_intervals(seconds: float | None, interval: float | None) -> None:
 
 
 class Keeper:
-    """Stores the states of a run as it goes.
+    """Stores the states of a run.
 
     Parameters
     ----------
     folder : of the run
     simulation : whose states are kept
     seconds : wall time between states, s; None: none but at the end of stages and on an interruption
-    interval : simulated time between states while shaking, s; None: none for its sake
+    interval : simulated time between states, s; None: without one
 
     Attributes
     ----------
@@ -156,7 +156,7 @@ class Keeper:
         self._clock, self._passed = time.monotonic(), 0 if is_end else self._intervals
 
     def forget(self, kept: int = 0) -> None:
-        """Remove all states of a run under way but the last so many, and what a kill has left unfinished."""
+        """Remove all numbered states but the last `kept`, and unfinished files of a killed run."""
         for path in self._folder.glob(f"*{_UNFINISHED}"):
             path.unlink()
         numbered = sorted(self._folder.glob(f"[0-9]*{_SUFFIX}"))
@@ -170,13 +170,13 @@ def exist(folder: Path) -> bool:
 
 
 def stored(folder: Path) -> list[Stored]:
-    """The states in the folder of a run, latest first. Damaged ones are left out and told of."""
+    """The states in the folder of a run, latest first. Damaged ones are left out with a warning."""
     found = []
     for path in (folder / FOLDER_NAME).glob(f"*{_SUFFIX}"):
         try:
             found.append(Stored(path, _note(path)))
         except DamagedState as error:
-            warnings.warn(f"{error}; it is passed over", ResumeWarning, stacklevel=3)
+            warnings.warn(f"{error}; it is left out", ResumeWarning, stacklevel=3)
     return sorted(found, key=lambda state: state.note.number, reverse=True)
 
 
@@ -188,8 +188,8 @@ def at_end_of(folder: Path, stage: str) -> Stored:
         raise InvalidInput(
             "start",
             (os.fspath(folder), stage),
-            f"must be a run and a stage that it has ended: {', '.join(ends) or 'there is none'}",
-            "let that run come to the end of the stage first",
+            f"must be a run and a stage that it has completed: {', '.join(ends) or 'there is none'}",
+            "let that run complete the stage first",
         )
     return Stored(ends[stage], _note(ends[stage]))
 
@@ -218,8 +218,8 @@ def refuse_other_start(state: Stored, own: dict[str, str]) -> None:
     stages = [name for name in own if name.startswith(STAGE_PREFIX)]
     last = STAGE_PREFIX + state.note.stage
     if last not in own:
-        told = ", ".join(name.removeprefix(STAGE_PREFIX) for name in stages)
-        raise InvalidInput("start", state.note.stage, f"must be a stage of the scene: {told}")
+        known = ", ".join(name.removeprefix(STAGE_PREFIX) for name in stages)
+        raise InvalidInput("start", state.note.stage, f"must be a stage of the scene: {known}")
     reached = stages[: stages.index(last) + 1]
     counted = [name for name in own if name not in (OUTPUT, *stages)] + reached
     theirs = state.note.fingerprints
@@ -229,5 +229,5 @@ def refuse_other_start(state: Stored, own: dict[str, str]) -> None:
 
 def _refuse(path: str, value: Path, differing: list[str], hint: str) -> None:
     if differing:
-        told = f"must be of the same scene, but had another {', '.join(differing)}"
-        raise InvalidInput(path, os.fspath(value), told, hint)
+        known = f"must be of the same scene, but had another {', '.join(differing)}"
+        raise InvalidInput(path, os.fspath(value), known, hint)

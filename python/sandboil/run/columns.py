@@ -1,7 +1,7 @@
-"""Free-field columns kept by one run and read by another, instead of being solved again.
+"""Free-field columns kept by one run and read by another, instead of being computed again.
 
 Two scenes share a column if the ground at the side, the motion that comes to it and the numerics are the
-same, whatever stands between the sides: a dam with and without its berm.
+same. What stands between the sides may differ: a dam with and without its berm.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .. import _core
 from .._errors import InvalidInput
 from ..files.committed_file import sync_folder
 from ..files.fingerprint import fingerprint
-from ..files.hdf5 import LAYOUT, opened, refuse_foreign, said, text
+from ..files.hdf5 import LAYOUT, opened, refuse_foreign, text, text_of
 
 Floats = NDArray[np.float64]
 
@@ -62,14 +62,14 @@ class ColumnRecord:
         }
 
     @classmethod
-    def of_core(cls, told: dict[str, Any]) -> ColumnRecord:
+    def of_core(cls, found: dict[str, Any]) -> ColumnRecord:
         """From what the numerical core gives."""
-        width = int(told["width"])
-        return cls(told["interval"], told["impedance"], told["wet"], told["values"].reshape(-1, width))
+        width = int(found["width"])
+        return cls(found["interval"], found["impedance"], found["wet"], found["values"].reshape(-1, width))
 
 
 def key(section: dict[str, Any], stage: dict[str, Any], hand: str, tolerance: float) -> str:
-    """Fingerprint of a column: of everything that has a say in what it does in a stage.
+    """Fingerprint of a column: of everything on which its motion in a stage depends.
 
     `section` and `stage` are the descriptions that the numerical core is given, `tolerance` is that of the
     gravity stage.
@@ -88,7 +88,7 @@ def key(section: dict[str, Any], stage: dict[str, Any], hand: str, tolerance: fl
         (segment for segment in base["segments"] if side["x"] <= segment[1]), base["segments"][-1]
     )
     lowest = float(section["base"][:, 1].min())
-    said = {
+    described = {
         "version": _core.__version__,
         "tolerance": tolerance,
         "y": position[rows, 1],
@@ -107,7 +107,7 @@ def key(section: dict[str, Any], stage: dict[str, Any], hand: str, tolerance: fl
         **{name: base[name] for name in ("vertical", "half_space")},
         **{name: stage[name] for name in ("duration", "local_damping", "rayleigh", "time_step_factor")},
     }
-    return fingerprint(said)
+    return fingerprint(described)
 
 
 def save(folder: Path, stage: str, hand: str, fingerprint: str, record: ColumnRecord) -> None:
@@ -147,23 +147,23 @@ def load(
             f"must be the folder of a run that kept its columns, but has no {FILE_NAME}",
             "run that scene with keep_columns=True",
         )
-    found = {}
+    records = {}
     with opened(path, "columns") as file:
         refuse_foreign(file, "columns")
         for stage, hand, fingerprint in fingerprints:
             group = file.get(f"{stage}/{hand}")
-            if group is None or said(group.attrs["key"]) != fingerprint:
-                told = "no column" if group is None else "a column of other ground, motion or numerics"
+            if group is None or text_of(group.attrs["key"]) != fingerprint:
+                found = "no column" if group is None else "a column of other ground, motion or numerics"
                 raise InvalidInput(
                     "columns",
                     str(folder),
-                    f"must hold the scene's own columns, but has {told} on the {hand} in {stage!r}",
-                    "leave columns out: they are then solved, which takes a few per cent of a run",
+                    f"must hold the scene's own columns, but has {found} on the {hand} in {stage!r}",
+                    "leave columns out: they are then computed, which takes a few per cent of a run",
                 )
-            found[stage, hand] = ColumnRecord(
+            records[stage, hand] = ColumnRecord(
                 float(group.attrs["interval_s"]),
                 np.asarray(group["impedance"][()], dtype=np.float64),
                 bool(group.attrs["wet"]),
                 np.asarray(group["values"][()], dtype=np.float64),
             )
-    return found
+    return records

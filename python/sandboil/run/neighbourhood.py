@@ -1,4 +1,4 @@
-"""Where a run diverged: the nodes around the place, as a table and as a picture."""
+"""The nodes around the place where a run diverged, as a table and as a picture."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from ..results.plots import neighbourhood as draw
 FILE_NAME = "neighbourhood.csv"
 PICTURE_NAME = "neighbourhood.png"
 
-# How far around the offending node is told, in spacings: beyond the reach of its neighbours' neighbours.
+# Radius around the offending node, in spacings: beyond its neighbours' neighbours.
 _REACH = 6.0
 
-# What is told of every node, besides its place and region.
+# Fields of every node in the table, besides its place and region.
 _FIELDS = (
     "displacement",
     "velocity",

@@ -47,10 +47,10 @@ class StagePlan:
     duration : s; None for gravity, which ends at rest, and for seepage to its steady state
     dt, dt_limit : time step at the beginning, s, and what limits it; 0 where no time passes
     undamped_dt : time step without the stage's Rayleigh damping, s; None if it has none
-    steps : expected; None where they cannot be told before
+    steps : expected; None where they cannot be known in advance
     step_time : wall time of a step in the trial, s
     trial_steps : number of steps of the trial
-    wall_time : expected, s; None where it cannot be told before
+    wall_time : expected, s; None where it cannot be known in advance
     """
 
     name: str
@@ -79,7 +79,7 @@ class Plan:
     arrays : bytes of the core's arrays by name, in the last stage
     file_size : fields and histories in the results before compression, bytes
     pore_pressure_coefficients : Skempton's B of each region, the lowest in it; empty without water
-    doubts : why the answer may not be what was meant, of which a run warns
+    doubts : why the answer may not be what was meant; a run warns of them
     """
 
     nodes: int
@@ -97,7 +97,7 @@ class Plan:
 
     @property
     def wall_time(self) -> float | None:
-        """Expected wall time of all stages, s; None if one of them cannot be told."""
+        """Expected wall time of all stages, s; None if that of one is not known."""
         known = [stage.wall_time for stage in self.stages if stage.wall_time is not None]
         return sum(known) if len(known) == len(self.stages) else None
 
@@ -138,15 +138,15 @@ class Plan:
 
 
 def _stage_lines(stage: StagePlan) -> list[str]:
-    steps = f"{stage.steps} steps" if stage.steps is not None else "number of steps not known before"
+    steps = f"{stage.steps} steps" if stage.steps is not None else "number of steps not known in advance"
     without = f" ({stage.undamped_dt:.3g} s without Rayleigh damping)" if stage.undamped_dt else ""
     timed = f"{steps} of {stage.dt:.3g} s, limited by the {stage.dt_limit}{without}"
     if stage.duration is not None:
-        told = f"{stage.duration:g} s, {timed}"
+        expected = f"{stage.duration:g} s, {timed}"
     else:
-        told = f"to rest, {timed}" if stage.dt > 0.0 else f"to its {stage.dt_limit}, {steps}"
+        expected = f"to rest, {timed}" if stage.dt > 0.0 else f"to its {stage.dt_limit}, {steps}"
     return [
-        f"{stage.name}: {told}",
+        f"{stage.name}: {expected}",
         f"  {_duration(stage.wall_time)}, {stage.step_time * 1e3:.3g} ms a step in a trial of "
         f"{stage.trial_steps} steps",
     ]
@@ -154,7 +154,7 @@ def _stage_lines(stage: StagePlan) -> list[str]:
 
 def _duration(seconds: float | None) -> str:
     if seconds is None:
-        return "not known before"
+        return "not known in advance"
     if seconds < 90.0:
         return f"about {seconds:.2g} s"
     return f"about {seconds / 60.0:.2g} min" if seconds < 5400.0 else f"about {seconds / 3600.0:.2g} h"
@@ -200,9 +200,9 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
     Raises :class:`InvalidInput` for what a run would refuse.
     """
     scene = with_accuracy(scene, accuracy)
-    told = doubts(scene, loaded_motions(scene))
+    found = doubts(scene, loaded_motions(scene))
     with warnings.catch_warnings():
-        # Those of the scene itself are on the page; these are of its motions cut.
+        # The doubts about the scene are on the page; these are about its cut motions.
         warnings.simplefilter("ignore", SandboilWarning)
         simulation = Simulation(_from_strong_part(scene), threads)
     stages = []
@@ -246,7 +246,7 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
         arrays=simulation.arrays(),
         file_size=_file_size(scene, simulation, stages),
         pore_pressure_coefficients=pore_pressure_coefficients(scene),
-        doubts=told,
+        doubts=found,
     )
 
 
@@ -261,7 +261,7 @@ def _physics(scene: Scene, simulation: Simulation) -> list[Physics]:
 
 
 def _from_strong_part(scene: Scene) -> Scene:
-    """The scene with its motions cut to begin where strong shaking does: a quiet start would tell nothing."""
+    """The scene with its motions cut to begin with strong shaking: steps of a quiet start are cheaper."""
     return scene.changed(stages=[stage.with_motions(_cut_at(_strong_time(stage))) for stage in scene.stages])
 
 
@@ -276,7 +276,7 @@ def _strong_time(stage: AnyStage) -> float:
 
 
 def _cut_at(begin: float) -> Callable[[MotionSpec], MotionSpec]:
-    """What takes the first `begin` s from a motion, and leaves two samples at least."""
+    """A change that removes the first `begin` s of a motion, and leaves at least two samples."""
 
     def cut(spec: MotionSpec) -> MotionSpec:
         motion = spec.load()
@@ -288,7 +288,7 @@ def _cut_at(begin: float) -> Callable[[MotionSpec], MotionSpec]:
 
 def _file_size(scene: Scene, simulation: Simulation, stages: list[StagePlan]) -> int:
     """Bytes of the frames and histories of a whole run, uncompressed."""
-    # Water that flows before the grains may move writes no frames of its own.
+    # A seepage stage before others writes no frames.
     written = [stage for stage in stages if scene.is_at_rest or stage.name != "seepage"]
     lasting = [(stage.duration, stage.dt) for stage in written if stage.duration is not None]
     duration = sum(duration for duration, _ in lasting)

@@ -1,4 +1,4 @@
-"""Running a scene into a folder: stages, output as it goes, progress, and an end with a readable file."""
+"""Running a scene into a folder: stages, output, progress, and readable results at every end."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from .columns import save as save_column
 if TYPE_CHECKING:
     from ..scene.scene import Scene
 
-# The time left is told from the speed of the last so many seconds: the soil's cost changes as it liquefies.
+# Time over which the speed is measured for the time left, s: the cost of a step changes in liquefied soil.
 _SPEED_WINDOW = 30.0
 
 
@@ -60,9 +60,9 @@ def run(
     threads : that share the work; results are the same bits for any number
     accuracy : fills only those numerics that the scene leaves open
     progress : whether to show a bar on stderr; default only on a terminal
-    columns : folder of a run that kept its free-field columns: they are read instead of solved again
+    columns : folder of a run that kept its free-field columns: they are read instead of computed
     keep_columns : whether to keep the columns, in `free_field.h5`
-    resume : go on with the run of this scene in `out` from its last checkpoint; the results are the same bits
+    resume : continue the run of this scene in `out` from its last checkpoint; the results are the same bits
         as those of a run that was never stopped. A complete run is returned as it is
     start : a run, or its folder, and a stage that it has ended: this run begins there, for example with the
         ground at rest of another one. Everything up to there must be the same in both scenes
@@ -117,7 +117,7 @@ def run(
             kept = f"its state at {keeper.last}" if keeper.last else "no state"
             raise SandboilError(
                 f"the run could not be written to {folder}: {error}; the results last written are whole and "
-                f"{kept} is kept: mend that and resume the run"
+                f"{kept} is kept: remove the cause and resume the run"
             ) from error
         finally:
             writer.abandon()
@@ -125,7 +125,7 @@ def run(
 
 
 def _refuse_unusable(folder: Path, resume: bool) -> None:
-    """Refuse a folder that cannot be written or made, and one that holds a run or, to resume, does not."""
+    """Refuse a folder that cannot be written or made, that holds a run, or, to resume, that holds none."""
     path = folder / FILE_NAME
     found = [place.name for place in (path, twin_of(path), folder / checkpoint.FOLDER_NAME) if place.exists()]
     if found and not resume:
@@ -152,12 +152,14 @@ def _refuse_unusable(folder: Path, resume: bool) -> None:
             "out",
             str(folder),
             f"must be writable, but {existing} is not",
-            "choose another or mend its rights",
+            "choose another or change its rights",
         )
 
 
 def _unwritable(folder: Path, error: OSError) -> InvalidInput:
-    return InvalidInput("out", str(folder), f"must be writable: {error}", "choose another or mend its rights")
+    return InvalidInput(
+        "out", str(folder), f"must be writable: {error}", "choose another or change its rights"
+    )
 
 
 @contextmanager
@@ -170,7 +172,7 @@ def _only_user(folder: Path) -> Iterator[None]:
         raise _unwritable(folder, error) from error
     try:
         try:
-            # The lock goes with the process, however that ends.
+            # The lock ends with the process.
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise InvalidInput(
@@ -187,7 +189,7 @@ def _only_user(folder: Path) -> Iterator[None]:
 def _earlier(folder: Path, simulation: Simulation) -> tuple[Run, checkpoint.Note | None]:
     """The run in a folder, and the note of its last good state, which the simulation takes over.
 
-    No note of a complete run, nor of one that was stopped before its first checkpoint: it has to begin anew.
+    No note of a complete run, nor of one that was stopped before its first checkpoint, which begins again.
     """
     path = folder / FILE_NAME
     repair(path)
@@ -199,8 +201,8 @@ def _earlier(folder: Path, simulation: Simulation) -> tuple[Run, checkpoint.Note
         if holds(path, state.note.results):
             simulation.restore(state.path, state.note.stage)
             return earlier, state.note
-        told = f"{state.path} is passed over: {path} does not reach it"
-        warnings.warn(told, ResumeWarning, stacklevel=3)
+        message = f"{state.path} is left out: {path} ends before it"
+        warnings.warn(message, ResumeWarning, stacklevel=3)
     if checkpoint.exist(folder):
         raise InvalidInput(
             "resume",
@@ -208,8 +210,8 @@ def _earlier(folder: Path, simulation: Simulation) -> tuple[Run, checkpoint.Note
             "must have a checkpoint that is sound, and its results up to there",
             "run the scene from its beginning, into another folder",
         )
-    told = f"the run in {folder} was stopped before its first checkpoint: it begins anew"
-    warnings.warn(told, ResumeWarning, stacklevel=3)
+    message = f"the run in {folder} was stopped before its first checkpoint: it begins again"
+    warnings.warn(message, ResumeWarning, stacklevel=3)
     return earlier, None
 
 
@@ -244,17 +246,17 @@ def _run_stages(
     except SandboilError as error:
         writer.close("stopped", str(error))
         if isinstance(error, SimulationDiverged):
-            _tell_where(simulation, error, writer.path.parent)
+            _write_neighbourhood(simulation, error, writer.path.parent)
         raise
     writer.close("complete")
 
 
-def _tell_where(simulation: Simulation, error: SimulationDiverged, folder: Path) -> None:
-    """Leave a table and a picture of the nodes around a divergence, and note them in the error."""
+def _write_neighbourhood(simulation: Simulation, error: SimulationDiverged, folder: Path) -> None:
+    """Write a table and a picture of the nodes around a divergence, and name the files in the error."""
     try:
         paths = _neighbourhood.write(folder, simulation, error)
     except OSError as failure:
-        # The divergence is what matters.
+        # The divergence must still be reported.
         error.add_note(f"its neighbourhood could not be written: {failure}")
         return
     error.add_note(f"its neighbourhood: {', '.join(str(path) for path in paths)}")
@@ -328,9 +330,9 @@ class Interrupt:
 
 @contextmanager
 def _interrupts() -> Iterator[Interrupt]:
-    """Turn Ctrl-C and SIGTERM into a request that is met between steps, so that no file is left half written.
+    """Turn Ctrl-C and SIGTERM into a request that is met between steps, so that every file is whole.
 
-    A second Ctrl-C stops at once. Only the main thread may take signals; others run on unheeding.
+    A second Ctrl-C stops at once. Only the main thread receives signals; runs in other threads continue.
     """
     interrupt = Interrupt()
     if threading.current_thread() is not threading.main_thread():
@@ -369,7 +371,7 @@ class Bar:
     def update(self, simulation: Simulation) -> None:
         """Show how far the stage has come."""
         if simulation.duration is None:
-            # Nobody knows how far rest or the steady state is: the row fills when it is reached.
+            # The way to rest or to the steady state is not known: the row fills at its end.
             total = 1.0 if simulation.stage_is_complete else None
             completed = total or 0.0
         else:

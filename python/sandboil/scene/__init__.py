@@ -1,1 +1,1 @@
-"""The scene: what is there, and what is done to it."""
+"""The scene: a section of ground, its water, and the stages that it goes through."""

@@ -49,7 +49,7 @@ def _series(value: object) -> tuple[tuple[float, float], ...]:
 
 
 def _shortest(pairs: tuple[tuple[float, float], ...]) -> object:
-    """A constant as the number that it was given by."""
+    """A constant as a number, other series as pairs."""
     return pairs[0][1] if len(pairs) == 1 else pairs
 
 
@@ -79,7 +79,7 @@ Line = Annotated[Edge | tuple[tuple[float, float], ...], BeforeValidator(_line)]
 
 
 def _through(points: Sequence[tuple[float, float]]) -> BaseGeometry:
-    """A line through points; as flat numbers, ten times as fast as from pairs."""
+    """A line through points. Made from flat numbers, which is ten times as fast as from pairs."""
     return shapely.LineString(np.fromiter(itertools.chain.from_iterable(points), np.float64).reshape(-1, 2))
 
 
@@ -213,7 +213,7 @@ class Pressure(_EdgeCondition):
 
 
 class Flux(_EdgeCondition):
-    """Inflow through a stretch of edge, m/s; negative draws water out, whatever the soil holds."""
+    """Inflow through a stretch of edge, m/s; negative draws water out, also from unsaturated soil."""
 
     _value: ClassVar[str | None] = "inflow"
     _unit: ClassVar[str] = "m/s"

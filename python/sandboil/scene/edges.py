@@ -1,4 +1,4 @@
-"""What lies beyond the base and the sides of a section. Units kN, m, s, Mg; x horizontal, y up."""
+"""The ground beyond the base and the sides of a section. Units kN, m, s, Mg; x horizontal, y up."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LEAST_SPEED_RATIO = sqrt(2.0)
 
 
 class Periodic(Model):
-    """What leaves on one side enters on the other: an infinitely wide repetition of the section."""
+    """A section that repeats without end: what leaves on one side enters on the other."""
 
     _label: ClassVar[str] = "sides"
 
@@ -30,10 +30,10 @@ class Periodic(Model):
 
 
 class FreeField(Model):
-    """Level ground that goes on beyond the side.
+    """Level ground that continues beyond the side.
 
     In the gravity stage a roller. In shaking a column of the soil at that side, solved on its own, pushes the
-    section as the ground beyond would, and dashpots let out the waves that the section sends.
+    section as the ground beyond would, and dashpots absorb the waves that leave the section.
     """
 
     _label: ClassVar[str] = "side"
@@ -79,9 +79,9 @@ AnySides = Annotated[Periodic | FreeField | Roller | Fixed | Sides, Field(discri
 
 
 class BaseSegment(Model):
-    """A stretch of the base, from `x[0]` to `x[1]` m, that its wave reaches `delay` s after the stage begins.
+    """A stretch of the base, from `x[0]` to `x[1]` m, that the wave reaches `delay` s after the stage begins.
 
-    The wave is that of the stage's motion unless the segment has a `motion` of its own.
+    The wave is that of the stage's motion unless the segment has another `motion`.
     """
 
     _label: ClassVar[str] = "segment"
@@ -140,13 +140,13 @@ class CompliantBase(Model):
 
     Its impedance is that of the soil at the base when the stage begins, unless `Vs` and `density` are given.
     Vertically it is a roller, which holds the weight and reflects compression waves, or absorbs them, as it
-    does by default under a vertical motion. `Vp` goes with `Vs` where compression waves matter: on a base
-    that absorbs them or is not level. An absorbing base holds the weight by the force it had when shaking
-    began, so that a load added later lets it sink: keep such stages short.
+    does by default under a vertical motion. `Vp` is needed beside `Vs` where compression waves matter: on a
+    base that absorbs them or is not level. An absorbing base holds the weight by the force at the
+    beginning of shaking, so that it sinks under a load added later: keep such stages short.
 
     With an `apparent_velocity` the wave runs along the base, to the right if positive and to the left if
-    negative, from the end of the base that it meets first. With `segments`, which must cover the base, every
-    stretch has a delay and may have a motion of its own.
+    negative, from the end of the base that it meets first. With `segments`, which must cover the base, each
+    stretch has a delay and may have another motion.
     """
 
     _label: ClassVar[str] = "base"
@@ -189,7 +189,7 @@ class CompliantBase(Model):
             raise InvalidInput(
                 "base",
                 {"Vs": self.Vs, "density": self.density},
-                "must have both Vs and density, or neither: then the soil at the base gives its own",
+                "must have both Vs and density, or neither: then the soil at the base gives them",
                 "rock of 400 m/s has about 2.1 Mg/m3",
             )
         if self.Vp is None:
@@ -198,7 +198,7 @@ class CompliantBase(Model):
             raise InvalidInput(
                 "base.Vp",
                 self.Vp,
-                "goes with Vs and density: without them the soil at the base gives its own",
+                "needs Vs and density: without them the soil at the base gives all three",
                 "give them too, or leave Vp out",
             )
         if self.Vp < LEAST_SPEED_RATIO * self.Vs:

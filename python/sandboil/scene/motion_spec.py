@@ -1,4 +1,4 @@
-"""Where a ground motion comes from, as a scene writes it down."""
+"""Sources of ground motions, as a scene stores them."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from ..motion import Motion
 
 
 class MotionSpec(Model):
-    """Where a ground motion comes from, so that a scene can be written down.
+    """Source of a ground motion, so that a scene can be written to a file.
 
-    Exactly one source: `file` (PEER .AT2, or a CSV with its `unit` and `column` unless its header tells),
+    Exactly one source: `file` (PEER .AT2, or a CSV with its `unit` and `column` unless its header has them),
     `synthetic` or `ricker` (arguments of the :class:`Motion` constructors of those names), or `dt` with
     `acceleration_g` or `velocity` (m/s). `scale` multiplies the motion.
     """
@@ -41,14 +41,14 @@ class MotionSpec(Model):
 
     @field_validator("synthetic", "ricker")
     @classmethod
-    def _complete(cls, said: dict[str, float] | None, field: ValidationInfo) -> dict[str, float] | None:
-        """Check the generator's arguments and write its defaults out: the scene then keeps its meaning."""
-        if said is None:
+    def _complete(cls, given: dict[str, float] | None, field: ValidationInfo) -> dict[str, float] | None:
+        """Check the generator's arguments and add its defaults, so that the scene keeps its meaning."""
+        if given is None:
             return None
         generator = str(field.field_name)
         known = dict(inspect.signature(getattr(Motion, generator)).parameters)
         known.pop("kind", None)
-        for name, value in said.items():
+        for name, value in given.items():
             if name not in known:
                 meant = nearest_name(name, known)
                 raise InvalidInput(
@@ -58,12 +58,12 @@ class MotionSpec(Model):
                     f"did you mean {meant!r}?" if meant else "leave it out, or take one of these",
                 )
         for name, parameter in known.items():
-            if parameter.default is inspect.Parameter.empty and name not in said:
+            if parameter.default is inspect.Parameter.empty and name not in given:
                 raise InvalidInput(
                     f"{generator}.{name}", None, "is required", f"see Motion.{generator} for what it takes"
                 )
         defaults = {name: parameter.default for name, parameter in known.items()}
-        complete = defaults | said
+        complete = defaults | given
         return {name: complete[name] for name in known if complete[name] is not None}
 
     @model_validator(mode="after")
@@ -82,25 +82,25 @@ class MotionSpec(Model):
             raise InvalidInput(
                 "motion.dt",
                 self.dt,
-                "goes with acceleration_g or velocity, and they with it",
-                "a file and a generator have their own; samples take it in s, for example 0.005",
+                "is given with acceleration_g or velocity, and only with them",
+                "files and generators have a time step; that of samples is in s, for example 0.005",
             )
         return self
 
     @classmethod
     def of(cls, motion: Motion) -> MotionSpec:
-        """How to write `motion` down: by its source if it is unchanged since, else by its samples."""
+        """The source of a motion that is unchanged since, else its samples."""
         if motion.source is None:
             samples: dict[str, Any] = {motion.quantity: getattr(motion, motion.quantity)}
             return cls(dt=motion.dt, kind=motion.kind, **samples)
         source = dict(motion.source)
         if "file" in source:
-            # Said relative to the working folder; a scene's file may be written anywhere.
+            # The name is relative to the working folder; a scene's file may be written to another one.
             source["file"] = str(Path(source["file"]).absolute())
         return cls(**source)
 
     def load(self) -> Motion:
-        """The motion itself; :class:`InvalidInput` if its file or its numbers are no motion."""
+        """The motion; :class:`InvalidInput` if its file or its numbers are no motion."""
         if self.file is not None:
             motion = Motion.from_file(self.file, unit=self.unit, column=self.column, kind=self.kind)
         elif self.synthetic is not None:
@@ -113,11 +113,11 @@ class MotionSpec(Model):
         return motion if self.scale is None else motion.scaled(factor=self.scale)
 
 
-def _said(value: object) -> object:
+def _source(value: object) -> object:
     if value is None or isinstance(value, (dict, MotionSpec)):
         return value
     return MotionSpec.of(value) if isinstance(value, Motion) else value
 
 
-GivenMotion = Annotated[MotionSpec | None, BeforeValidator(_said)]
-"""A motion itself, or how it is written down, or none."""
+GivenMotion = Annotated[MotionSpec | None, BeforeValidator(_source)]
+"""A motion, or its source, or none."""

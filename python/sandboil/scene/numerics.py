@@ -19,14 +19,14 @@ _LEAVE: JsonDict = {"remedy": "leave it out for the default, which suits most sc
 
 
 class Numerics(Model):
-    """How it is computed. The defaults are for engineering; the rest is for studies of the method itself.
+    """Numbers of the method. The defaults are for engineering; other values are for studies of the method.
 
     `smoothing_ratio` is h/spacing; `velocity_filter` (default 0.2) and `local_damping` are
     fractions; `time_step_factor` is
-    relative to the measured stability limit; beyond `geometry_strain_limit` the particle lists follow the
-    motion (default 0.2, and 0.02 for the printed operators, which do not carry the deformation).
-    `dispersion_correction` keeps short waves from being slow while shaking, and contacts of soils and
-    the surface from being out of place for them, at shorter and dearer steps.
+    relative to the measured stability limit; beyond `geometry_strain_limit` the particle lists are
+    renewed (default 0.2, and 0.02 for the printed operators, which do not follow the deformation).
+    `dispersion_correction` corrects the speed of short waves while shaking, and the positions of contacts of
+    soils and of the surface for them, at shorter and costlier steps.
     """
 
     _label: ClassVar[str] = "numerics"
@@ -65,7 +65,7 @@ class Numerics(Model):
 
     @model_validator(mode="after")
     def _no_idle_choice(self) -> Numerics:
-        """Refuse what would be said in vain: a choice that the others leave nothing to act on."""
+        """Refuse a choice without effect beside the others."""
         idle = [
             (
                 "integrator_tolerance",
@@ -76,8 +76,8 @@ class Numerics(Model):
             (
                 "acceleration_term",
                 self.acceleration_term == "on" and self.diffusion == "implicit",
-                "is left out by implicit diffusion",
-                "diffusion = 'explicit' carries it",
+                "is not computed by implicit diffusion",
+                "diffusion = 'explicit' computes it",
             ),
             (
                 "velocity_filter",
@@ -88,11 +88,11 @@ class Numerics(Model):
             (
                 "dispersion_correction",
                 self.operators == "printed" and self.dispersion_correction,
-                "is not for the printed operators, whose force is not the transpose of their strain",
+                "cannot be used with the printed operators, whose force is not the transpose of their strain",
                 "leave it out, or take operators = 'conservative'",
             ),
         ]
-        for name, is_idle, told, remedy in idle:
+        for name, is_idle, allowed, remedy in idle:
             if is_idle:
-                raise InvalidInput(f"numerics.{name}", getattr(self, name), told, remedy)
+                raise InvalidInput(f"numerics.{name}", getattr(self, name), allowed, remedy)
         return self

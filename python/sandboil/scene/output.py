@@ -1,4 +1,4 @@
-"""What is kept of a run."""
+"""Results that a run keeps."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from .._types import MAX_PARTS, Many, Number, Point
 
 
 class Output(Model):
-    """What is kept of a run. It never changes the time step.
+    """Results that a run keeps. They never change the time step.
 
     Histories are taken at the surface, the base, the `depths` (m below ground, in the mid column) and the
-    `points` (x, y) every `history_dt` s; all fields every `field_dt` s; envelopes see every step.
+    `points` (x, y) every `history_dt` s; all fields every `field_dt` s; envelopes include every step.
     """
 
     _label: ClassVar[str] = "output"
@@ -25,13 +25,13 @@ class Output(Model):
         default=0.005,
         gt=0.0,
         description="s",
-        json_schema_extra={"remedy": "0.005 shows all below 100 Hz"},
+        json_schema_extra={"remedy": "0.005 resolves frequencies below 100 Hz"},
     )
     field_dt: Number = Field(
         default=0.25,
         gt=0.0,
         description="s",
-        json_schema_extra={"remedy": "0.25 makes four pictures a second"},
+        json_schema_extra={"remedy": "0.25 gives four frames a second"},
     )
     envelopes: Many[Literal["r_u", "gamma_max"]] = ("r_u", "gamma_max")
     stress_paths: StrictBool = Field(

@@ -26,11 +26,10 @@ class Region(Model):
     """A part of the section made of one soil.
 
     Densities: any sufficient set of `Gs`, `porosity` or `void_ratio`, and unit weights in kN/m3. PM4Sand's
-    void ratio comes from its relative density. `bulk_unit_weight` is that of the soil as it stands: saturated
-    in a scene with water, dry in one without. Without `hydraulic_conductivity` (m/s, or a
-    :class:`Conductivity` that differs with direction) the region is undrained. `retention` tells what it
-    holds above the water table. `K0` is the ratio of horizontal to vertical effective stress that the gravity
-    stage aims at.
+    void ratio follows from its relative density. `bulk_unit_weight` is that of saturated soil in a scene with
+    water, of dry soil in one without. Without `hydraulic_conductivity` (m/s, or a :class:`Conductivity` that
+    differs with direction) the region is undrained. `retention` gives its saturation above the water table.
+    `K0` is the ratio of horizontal to vertical effective stress in level ground after the gravity stage.
     """
 
     _label: ClassVar[str] = "region"
@@ -45,7 +44,7 @@ class Region(Model):
         json_schema_extra={"remedy": "1e-3 is a coarse sand, 1e-5 a fine one, 1e-8 a silty clay"},
     )
     retention: VanGenuchten | None = Field(
-        default=None, description="what it holds above the water table; none: all pores stay full"
+        default=None, description="saturation above the water table; none: all pores stay full"
     )
     Gs: Annotated[Number, Field(gt=1.0)] | None = Field(
         default=None,

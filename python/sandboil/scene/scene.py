@@ -1,4 +1,4 @@
-"""The scene: what is there, and what is done to it. Units kN, m, s, Mg; x horizontal, y up.
+"""The scene: a section of ground and the stages that it goes through. Units kN, m, s, Mg; x horizontal, y up.
 
 Everything is checked when the scene is made, so that a scene that exists can be computed.
 """

@@ -24,7 +24,7 @@ _DILATION: JsonDict = {"remedy": "0 keeps volume, phi is associated flow, which 
 _COHESION: JsonDict = {
     "remedy": "for soil without friction c is the undrained strength; 0.1 to 1 kPa is an apparent cohesion"
 }
-_TENSION: JsonDict = {"remedy": "leave it out for the apex c/tan(phi), 0 for soil that bears no tension"}
+_TENSION: JsonDict = {"remedy": "leave it out for the apex c/tan(phi), 0 for soil without tensile strength"}
 _SOFTENING: JsonDict = {"remedy": "a shear strain, not a percentage: 5 % is written 0.05"}
 _EXPONENT: JsonDict = {"remedy": "about 0.5 for sand; 0 is Elastic"}
 _MODULUS: JsonDict = {"remedy": "soils have 1e4 to 1e6 kPa; 50 MPa is written 5e4"}
@@ -299,10 +299,10 @@ class PressureElastic(_Skeleton):
 
 
 class _Plastic(_Skeleton):
-    """A soil with strength. What parameters must be to each other the numerical core knows, and is asked."""
+    """A soil with strength. The numerical core checks its parameters against one another."""
 
     def _check_set(self) -> None:
-        """Refuse what is not a set at all; the core checks the values."""
+        """Refuse an incomplete set of parameters; the core checks the values."""
 
     @model_validator(mode="after")
     def _accepted_by_the_core(self) -> Self:
@@ -316,7 +316,7 @@ class _Plastic(_Skeleton):
 
 
 def _require_softening_strain(residual: dict[str, float | None], softening_strain: float | None) -> None:
-    """A residual strength and the strain that leads to it are given together or not at all."""
+    """A residual strength and the strain at which it is reached are given together or not at all."""
     given = [name for name, value in residual.items() if value is not None]
     if given and softening_strain is None:
         raise InvalidInput(
@@ -436,16 +436,16 @@ class MohrCoulomb(_Frictional):
 
 
 class TotalStress(_Plastic):
-    """Undrained shear strength Su (kPa) of the soil itself, whatever its pressure, with softening to Sr.
+    """Undrained shear strength Su (kPa) of the soil itself at any pressure, with softening to Sr.
 
     `criterion` "tresca" bounds the radius of Mohr's circle in the plane and leaves the out-of-plane stress
     elastic; "von_mises" bounds sqrt(J2). With `Sr` strength falls with plastic shear strain kappa:
     `softening` is "exponential", Sr + (Su - Sr) exp(-kappa/softening_strain), or "linear",
     at Sr from `softening_strain` on. Elasticity by G and K or by E and nu.
 
-    Say once what resists compression: either the region lies under water, K is the drained bulk modulus and
+    Count the stiffness of water once: either the region lies under water, K is the drained bulk modulus and
     the pore water adds its K_f/n; or the section is dry, stress is total and K is the undrained K + K_f/n. Do
-    not do both. Long names `undrained_strength` and `residual_strength` are accepted. Raises
+    not combine them. Long names `undrained_strength` and `residual_strength` are accepted. Raises
     :class:`InvalidInput`, also for softening steeper than elastic unloading.
     """
 
@@ -492,7 +492,7 @@ Material = Annotated[
 
 
 def material(table: dict[str, Any]) -> Material:
-    """The soil that a table of `kind` and parameters says; :class:`InvalidInput` if it says none."""
+    """The soil of a table of `kind` and parameters; :class:`InvalidInput` if there is none."""
     given: dict[str, Any] = {"material": table}
     return _Soil(**given).material
 

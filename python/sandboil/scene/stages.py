@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..motion import Motion
 
 Poisson = Annotated[Number, Field(ge=0.0, lt=0.5)]
-# Hz, far beyond earthquakes and sites on both sides; outside, damping would make time steps of nothing.
+# Hz, far beyond earthquakes and sites on both sides; outside, damping would make time steps far too short.
 Frequency = Annotated[Number, Field(ge=0.01, le=1000.0)]
 
 
@@ -57,8 +57,8 @@ class _Stage(Model):
 class Seepage(_Stage):
     """Water that flows through the ground at rest, before anything moves.
 
-    Without a `duration` (s) the state that does not change any more, found without time. It starts from the
-    scene's water table, at rest, and what it ends with is the pore water of the stages that follow.
+    Without a `duration` (s) the steady state, found without time. It starts from the scene's water table at
+    rest, and its final pore water is that of the stages that follow.
     """
 
     _positional: ClassVar[tuple[str, ...]] = ("conditions",)
@@ -102,7 +102,7 @@ class Gravity(_Stage):
     )
     max_steps: Count = Field(
         default=200_000,
-        description="after which it gives up",
+        description="largest number of steps",
         json_schema_extra={"remedy": "leave it out for 200000"},
     )
     initial_poisson_ratio: Poisson | None = Field(
@@ -122,8 +122,8 @@ class Rayleigh(Model):
     """Viscous damping of a `ratio` of critical at two `frequencies`, less between them and more outside.
 
     A drag in proportion to mass, on the absolute velocity, and a viscous stress in proportion to the soil's
-    present elastic stiffness: xi(w) = a/(2 w) + b w/2. The second fades as sand softens, and shortens the
-    time step, since the shortest waves on the grid are damped most. Usual ratios are 0.005 to 0.03.
+    present elastic stiffness: xi(w) = a/(2 w) + b w/2. The second decreases as sand softens, and shortens the
+    time step, since it damps the shortest waves on the grid most. Usual ratios are 0.005 to 0.03.
     """
 
     _label: ClassVar[str] = "rayleigh"
@@ -159,16 +159,16 @@ class Rayleigh(Model):
 
 
 class Shaking(_Stage):
-    """Dynamic stage on a compliant base: PM4Sand at work, water flowing.
+    """Dynamic stage on a compliant base, with the soils' own models and the flow of water.
 
-    Without a motion the ground stands on its dashpots for `duration` seconds. With one, `duration` is that of
+    Without a motion the ground rests on its dashpots for `duration` seconds. With one, `duration` is that of
     the motion and of its way along the base unless given; a longer one adds quiet time. `vertical` is the
     vertical component of the same record (same kind and spacing), positive upwards; the base then absorbs
     vertically too. `rayleigh` damps beside the soil's own hysteresis.
 
     `conditions` are those of the water while the ground moves, with time counted from the stage's beginning.
-    Left out, those that held before go on as they last were; an empty list ends them all. Edges without one
-    are impermeable, save the ground surface, which keeps its pressure. Lines go with the ground.
+    Left out, those before hold with their last values; an empty list ends them all. Edges without one are
+    impermeable, but for the ground surface, which keeps its pressure. Lines move with the ground.
     """
 
     _positional: ClassVar[tuple[str, ...]] = ("motion",)
@@ -269,17 +269,17 @@ class Shaking(_Stage):
 
 
 class RunOut(_Stage):
-    """Ground that flows, to where it comes to rest: large displacements under its own weight.
+    """Run-out: large displacements under the weight of the ground, until it comes to rest.
 
-    The base and the sides are held where they stand, as in statics, and the ground flows over them from the
-    state and the motion that the stage before has left. It is the last stage.
+    Base and sides are fixed as in statics, and the ground moves on them from the state and the motion at the
+    end of the stage before. It is the last stage.
 
-    `open_sides` are taken away, as a gate is, and the base goes on beyond them. `viscosity` is Monaghan's
-    coefficient of the forces that brake particles which approach each other. `still_water` is the surface of
+    `open_sides` are removed, as a gate is, and the base continues beyond them. `viscosity` is Monaghan's
+    coefficient of the forces between particles that approach each other. `still_water` is the surface of
     the water around the ground, (x, y) from left to right, level beyond its ends; left out, that of the state
     at rest, ponds and water table; empty, there is none. Pore pressure beyond its hydrostatic pressure drains
-    through the free surface, wherever that comes to be. Soil above the water keeps the suction and the water
-    it has.
+    through the free surface, which moves with the ground. Soil above the water keeps its suction and its
+    water.
     """
 
     _positional: ClassVar[tuple[str, ...]] = ("duration",)
@@ -289,7 +289,7 @@ class RunOut(_Stage):
     kind: Literal["run-out"] = "run-out"
     duration: Positive = Field(
         description="s",
-        json_schema_extra={"remedy": "a heap falls for sqrt(2 height/gravity) s, and flows twice as long"},
+        json_schema_extra={"remedy": "a heap falls for sqrt(2 height/gravity) s, and moves twice as long"},
     )
     open_sides: Annotated[Many[Literal["left", "right"]], Field(max_length=2)] = ()
     viscosity: Number = Field(

@@ -14,7 +14,7 @@ from .._errors import InvalidInput
 from .._model import Model
 from .._types import MAX_PARTS, Floats, Many, NonNegative, Number, Point, Positive
 
-_LAYERS: JsonDict = {"remedy": "layered soils have several times less across their layers, but not none"}
+_LAYERS: JsonDict = {"remedy": "layered soils have several times less across their layers, but not zero"}
 
 
 class Water(Model):
@@ -51,11 +51,11 @@ class WaterTable(Model):
 
     @model_validator(mode="after")
     def _one_level(self) -> WaterTable:
-        said = {"elevation": self.elevation, "depth": self.depth, "points": self.points}
-        if sum(value is not None for value in said.values()) != 1:
+        given = {"elevation": self.elevation, "depth": self.depth, "points": self.points}
+        if sum(value is not None for value in given.values()) != 1:
             raise InvalidInput(
                 "water_table",
-                said,
+                given,
                 "must be given by exactly one of elevation, depth and points",
                 "depth = 0 is at the highest ground",
             )
@@ -83,7 +83,7 @@ class Conductivity(Model):
     """Hydraulic conductivity that differs with direction, m/s.
 
     `horizontal` acts along a line that rises by `angle_deg` degrees towards positive x, `vertical` at right
-    angles to it: the lie of inclined layers.
+    angles to it, as in inclined layers.
     """
 
     _label: ClassVar[str] = "hydraulic_conductivity"
@@ -183,7 +183,7 @@ class VanGenuchten(Model):
 
 
 def _tensor(value: object) -> object:
-    """A table as the conductivity that it tells, which refuses its own values."""
+    """A table as a conductivity, which checks its values."""
     return Conductivity(**value) if isinstance(value, dict) else value
 
 

@@ -23,7 +23,7 @@ def check_bases(scene: Scene) -> None:
                 f"{path}.vertical",
                 stage.base_vertical,
                 f"must be as in the first shaking stage, {first!r}",
-                "say base = CompliantBase(vertical='absorbing') in every one of them",
+                "give each of them base = CompliantBase(vertical='absorbing')",
             )
         if stage.base.Vs is not None and stage.base.Vp is None and not scene.outline.base_is_level:
             raise InvalidInput(

@@ -24,14 +24,14 @@ _PASSIVE = ("drain", "seepage-face")
 
 
 def refuse_misplaced(scene: Scene, condition: AnyCondition, line: BaseGeometry, path: str) -> None:
-    """A condition holds on a line of the section, and its heads lie in it or above."""
+    """A condition holds on a line of the section, and its heads do not lie below the base."""
     if isinstance(condition, Drain):
         if not shapely.buffer(scene.section, COORDINATE_TOLERANCE).covers(line):
             raise InvalidInput(
                 f"{path}.points",
                 condition.points,
                 "must lie in the section",
-                "water at its edges is told by the other conditions",
+                "the other conditions are for the edges",
             )
     elif line.is_empty or line.length <= COORDINATE_TOLERANCE:
         raise InvalidInput(
@@ -47,7 +47,7 @@ def refuse_misplaced(scene: Scene, condition: AnyCondition, line: BaseGeometry, 
             raise InvalidInput(
                 f"{path}.on",
                 condition.on,
-                "does not go with periodic sides, which are no edges",
+                "must not be a periodic side, which is no edge",
                 "sides = Roller() or FreeField()",
             )
     lowest = scene.outline.base[:, 1].min()
@@ -65,14 +65,14 @@ def refuse_misplaced(scene: Scene, condition: AnyCondition, line: BaseGeometry, 
 
 @functools.lru_cache(maxsize=8)
 def _band(edge: BaseGeometry, width: float) -> BaseGeometry:
-    """What lies within a distance (m) of an edge, less a sliver where the edge turns; quick to ask."""
+    """The area within a distance (m) of an edge, prepared for fast queries."""
     band = shapely.buffer(edge, width)
     shapely.prepare(band)
     return band
 
 
 def _check_points(scene: Scene, points: Sequence[tuple[float, float]], line: BaseGeometry, path: str) -> None:
-    """The points of a line, and what lies between them, must be on the edge."""
+    """The points of a line and the stretches between them must lie on the edge."""
     edge = scene.section.exterior
     if _band(edge, scene.spacing).covers(line):
         return
@@ -110,12 +110,12 @@ def refuse_shared_edges(placed: Sequence[Placed], path: str) -> None:
     pairs = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=COORDINATE_TOLERANCE).T
     for i, j in sorted((int(i), int(j)) for i, j in pairs if i < j):
         (k, _, one), (m, on, line) = edges[i], edges[j]
-        # All of the one that the other reaches: a line may be long, and meet its neighbour at its end alone.
+        # Only the part of the first near the second: a long line may meet its neighbour at one end alone.
         x0, y0, x1, y1 = line.bounds
         margin = 2.0 * COORDINATE_TOLERANCE
         near = shapely.clip_by_rect(one, x0 - margin, y0 - margin, x1 + margin, y1 + margin)
         common = line.intersection(shapely.buffer(near, COORDINATE_TOLERANCE))
-        # Lines that meet share the reach of their ends.
+        # Lines that meet share the tolerance around their ends.
         if common.length > 4.0 * COORDINATE_TOLERANCE:
             x0, y0, x1, y1 = common.bounds
             raise InvalidInput(
@@ -130,14 +130,14 @@ def refuse_shared_edges(placed: Sequence[Placed], path: str) -> None:
 def refuse_beside_columns(
     scene: Scene, condition: AnyCondition, line: BaseGeometry, at_rest: AtRest, path: str
 ) -> None:
-    """Free-field columns know no conditions of their own."""
+    """Free-field columns have no conditions."""
     if "free-field" not in scene.side_kinds or isinstance(condition, Drain):
         return
     if "free-field" in sides_along(scene, line):
         raise InvalidInput(
             f"{path}.on",
             condition.on,
-            "must not be a free-field side, whose column tells the water there",
+            "must not be a free-field side, where the column gives the water",
             "leave the condition out",
         )
     on_surface = line.distance(scene.outline.edges["surface"]) <= COORDINATE_TOLERANCE
@@ -146,14 +146,14 @@ def refuse_beside_columns(
         raise InvalidInput(
             f"{path}.{name}",
             getattr(condition, name),
-            "must stay on the surface what it was in the seepage stage, beside free-field sides: their "
-            "columns keep the water they have",
+            "must be on the surface as in the seepage stage beside free-field sides: their columns keep "
+            "their water",
             "sides = Roller(), far away",
         )
 
 
 def refuse_flooded(scene: Scene, condition: AnyCondition, line: BaseGeometry, path: str) -> None:
-    """Soil that is dry at rest takes no water: it has no retention curve to tell how."""
+    """Soil that is dry at rest takes no water: it has no retention curve."""
     if not scene.is_partly_saturated or scene.holds_suction or condition.kind in _PASSIVE:
         return
     x, y = shapely.get_coordinates(shapely.segmentize(line, scene.spacing)).T

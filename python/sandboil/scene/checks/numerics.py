@@ -18,7 +18,7 @@ def check_damping(scene: Scene) -> None:
                 f"scene.stages[{i}].rayleigh",
                 stage.rayleigh,
                 "must be left out with the printed operators: their force is not the transpose of their "
-                "strain, so a viscous stress may feed waves instead of damping them",
+                "strain, so a viscous stress may amplify waves instead of damping them",
                 "numerics.local_damping works with both, or take operators = 'conservative'",
             )
 
@@ -29,7 +29,7 @@ def check_inertia(scene: Scene) -> None:
         raise InvalidInput(
             "scene.numerics.dispersion_correction",
             True,
-            "must be left out beside free-field sides, whose push is reckoned with the plain inertia",
+            "must be left out beside free-field sides, whose columns have the plain inertia",
             "level ground on Periodic sides may have it; elsewhere take a smaller spacing",
         )
 
@@ -40,7 +40,7 @@ def check_printed_water(scene: Scene) -> None:
         raise InvalidInput(
             "scene.numerics.operators",
             "printed",
-            "must be 'conservative' in saturated ground beside free-field sides: Eq. 9 feeds waves where "
-            "pressure is held at no surface",
+            "must be 'conservative' in saturated ground beside free-field sides: Eq. 9 adds energy to waves "
+            "where no surface fixes the pressure",
             "dry ground or Periodic sides may have the printed operators",
         )

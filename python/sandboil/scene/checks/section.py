@@ -21,7 +21,7 @@ LEAST_SIDE_ROWS = 2
 
 
 def check_names(scene: Scene) -> None:
-    """Every region has a name of its own."""
+    """No two regions have the same name."""
     names = [region.name for region in scene.regions]
     for i, name in enumerate(names):
         if name in names[:i]:

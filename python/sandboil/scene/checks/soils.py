@@ -23,7 +23,7 @@ def check_densities(scene: Scene) -> None:
 
 
 def check_materials(scene: Scene) -> None:
-    """The core takes the parameters of every soil, here at a stress that any soil bears."""
+    """The core accepts the parameters of every soil, at a stress that any soil can carry."""
     for i, region in enumerate(scene.regions):
         try:
             _core.small_strain_moduli(region.material.core(), (-100.0, -100.0, 0.0, -100.0))

@@ -46,27 +46,27 @@ def _refuse_run_out(scene: Scene, stage: RunOut, i: int) -> None:
         raise InvalidInput(
             "scene.numerics.operators",
             "printed",
-            "must be 'conservative' where the ground flows: the printed ones bear small strains alone",
+            "must be 'conservative' in a run-out: the printed ones are for small strains",
             "leave it out",
         )
     if scene.numerics.dispersion_correction:
         raise InvalidInput(
             "scene.numerics.dispersion_correction",
             True,
-            "must be left out where the ground flows: its contacts do not stay where they are",
+            "must be left out in a run-out: the contacts of soils move",
             "leave it out",
         )
     if stage.open_sides and scene.is_periodic:
         raise InvalidInput(
             f"{path}.open_sides",
             stage.open_sides,
-            "does not go with periodic sides, which are none",
+            "cannot open periodic sides",
             "sides = Roller()",
         )
     if stage.still_water and scene.water is None:
         raise InvalidInput(
             f"{path}.still_water",
             stage.still_water,
-            "goes with water, of which the scene has none",
+            "needs water; this scene has none",
             "water = Water()",
         )

@@ -26,7 +26,7 @@ _RETENTION = "VanGenuchten(alpha=7.5, n=1.89) is a sandy loam"
 
 
 def check_water_table(scene: Scene) -> None:
-    """Water and its table are given together, and soil above the table says what it holds."""
+    """Water and its table are given together, and soil above the table has a retention curve."""
     if scene.water is None and scene.water_table is not None:
         raise InvalidInput("scene.water", None, "is required when there is a water table", _WATER)
     if scene.water is not None and scene.water_table is None:
@@ -72,8 +72,8 @@ def _refuse_seepage(scene: Scene, stage: Seepage, place: int) -> None:
         raise InvalidInput(
             f"{path}.kind",
             stage.kind,
-            "must be the first stage: the ground is at rest",
-            "water that flows while the ground moves is computed by the other stages themselves",
+            "must be the first stage: the ground is at rest in it",
+            "the other stages compute the flow of water in moving ground",
         )
     if scene.water is None:
         raise InvalidInput("scene.water", None, "is required by a seepage stage", _WATER)
@@ -89,7 +89,7 @@ def _refuse_seepage(scene: Scene, stage: Seepage, place: int) -> None:
         raise InvalidInput(
             f"{path}.conditions",
             kinds,
-            "must tell the pressure somewhere: with fluxes alone no state is steady, or any level is",
+            "must fix the pressure somewhere: with fluxes alone no steady state exists, or many do",
             "a Head, a Reservoir, a SeepageFace, or a duration",
         )
     places = placed(scene, stage.conditions)
@@ -111,7 +111,7 @@ def _refuse_moving(scene: Scene, conditions: Sequence[AnyCondition], path: str) 
     """Conditions of a stage in which the ground moves."""
     kinds = [condition.kind for condition in conditions]
     if scene.water is None:
-        raise InvalidInput(path, kinds, "go with water, of which the scene has none", _WATER)
+        raise InvalidInput(path, kinds, "need water; this scene has none", _WATER)
     if not _is_permeable(scene):
         raise InvalidInput(path, kinds, "need soil that water flows through", _PERMEABLE)
     at_rest, places = AtRest.of(scene), placed(scene, conditions)
@@ -124,7 +124,7 @@ def _refuse_moving(scene: Scene, conditions: Sequence[AnyCondition], path: str) 
 
 
 def _refuse_desaturation(scene: Scene, water: Water, places: Sequence[Placed]) -> None:
-    """Soil that heads leave above them must say what it holds."""
+    """Soil above the lowest head needs a retention curve."""
     drained = any(isinstance(condition, Drain) for condition, _ in places)
     drowned = drained and _is_drowned(scene, places)
     levels = [
@@ -145,7 +145,7 @@ def _refuse_desaturation(scene: Scene, water: Water, places: Sequence[Placed]) -
 
 
 def _is_drowned(scene: Scene, places: Sequence[Placed]) -> bool:
-    """Whether open water stands on all of the ground: a drain then draws through what stays full."""
+    """Whether open water covers all of the ground: soil above a drain then stays full."""
     dry = scene.outline.edges["surface"]
     for condition, line in places:
         level = min((value for _, value in condition.heads), default=-np.inf)
