@@ -23,7 +23,7 @@ import sandboil as sb
 import tomli_w
 from sandboil import InvalidInput, cli, lab
 from sandboil.core.simulation import Simulation
-from sandboil.results.plots import Reference
+from sandboil.results.reference import Reference
 
 Slip = Callable[[], object]
 Change = Callable[[dict[str, Any]], object]

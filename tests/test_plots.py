@@ -10,7 +10,8 @@ import scenes
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from sandboil import FreeField, Gravity, InvalidInput, Output, Region, Run, polygon, run
-from sandboil.results.plots import Reference, column, plot, pore_pressure, section, stress_paths, surface
+from sandboil.results.plots import column, plot, pore_pressure, section, stress_paths, surface
+from sandboil.results.reference import Reference
 
 PNG = b"\x89PNG"
 

@@ -44,8 +44,8 @@ from sandboil.cli.inputs import strains_of
 from sandboil.core.simulation import Simulation
 from sandboil.files import toml
 from sandboil.files.hdf5 import LAYOUT
-from sandboil.results import plots
 from sandboil.results import reader as results
+from sandboil.results import reference
 from sandboil.run import checkpoint, columns
 from sandboil.scene.soils import material
 
@@ -478,7 +478,7 @@ def readers(folder: Path) -> dict[str, Callable[[], Reader]]:
         "at2": lambda: Reader([AT2, OLDER], sb.Motion.from_file, "m.AT2"),
         "csv": lambda: Reader([CSV, SEMICOLONS], sb.Motion.from_file, "m.csv"),
         "strain-path": lambda: Reader([STRAINS], strains_of, "path.csv"),
-        "reference": lambda: Reader([TABLE], plots._table, "histories.csv"),
+        "reference": lambda: Reader([TABLE], reference._table, "histories.csv"),
         "results": results_file,
         "columns": columns_file,
         "state": state,

@@ -22,9 +22,9 @@ from ..core.doubts import doubts
 from ..core.motions import loaded_motions
 from ..motion import Kind, Motion
 from ..results.layout import FILE_NAME
-from ..results.plots import Reference
 from ..results.plots import plot as draw
 from ..results.reader import load
+from ..results.reference import Reference
 from ..run import checkpoint
 from ..run.accuracy import Accuracy
 from ..run.plan import plan as plan_of

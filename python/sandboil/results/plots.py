@@ -6,10 +6,8 @@ drawn over them; :class:`Reference` lists the columns.
 
 from __future__ import annotations
 
-import io
 import math
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +18,6 @@ from .._errors import InvalidInput
 from .._style import DPI, INPUT, OURS, REFERENCE, new_figure, styled
 from .._types import Floats
 from ..core.quantities import CONSTANT_FORCES
-from ..files.input_file import read_text
 from ..motion import Motion
 from ..motion._motion import SIGNIFICANT
 from ..motion._series import butterworth
@@ -28,6 +25,7 @@ from ..scene.stages import RunOut
 from .layout import Stage
 from .reader import Run
 from .records import interval_of
+from .reference import Reference, column_of
 from .summary import PGA_CORNER, PGA_ORDER
 
 if TYPE_CHECKING:
@@ -48,50 +46,6 @@ _NEIGHBOURS = 12
 _COLUMN_TIMES = 6
 # Width of the sway over the height of the column in its picture, before the factor is rounded.
 _SWAY_SHARE = 0.6
-
-
-@dataclass(frozen=True)
-class Reference:
-    """Results of another code, drawn over those of a run, from a folder of CSV files with a header each.
-
-    ``histories.csv``: time_s, acc_surface_g, and ru_<depth>m for any depths (4 m: ru_4m).
-    ``spectrum.csv``: period_s and psa_surface_g_5pct.
-    ``stress_strain.csv``: time_s, and tau_kPa_<depth>m, sv_eff_kPa_<depth>m, gamma_<depth>m.
-    Compression positive, time 0 at the start of the record. Other columns are ignored.
-    """
-
-    histories: dict[str, Floats]
-    spectrum: dict[str, Floats]
-    stress_strain: dict[str, Floats]
-
-    @classmethod
-    def read(cls, folder: str | os.PathLike[str]) -> Reference:
-        """The files of a folder; :class:`InvalidInput` names the one that is missing or no such table."""
-        return cls(
-            **{
-                name: _table(Path(folder) / f"{name}.csv")
-                for name in ("histories", "spectrum", "stress_strain")
-            }
-        )
-
-
-def _table(path: Path) -> dict[str, Floats]:
-    header, _, rows = read_text(path, "reference", "CSV file").partition("\n")
-    names = header.strip().split(",")
-    try:
-        values = np.loadtxt(io.StringIO(rows), delimiter=",", ndmin=2) if rows.strip() else np.empty((0, 0))
-    except ValueError as error:
-        raise InvalidInput(
-            "reference", str(path), f"must be a CSV of numbers below a header: {error}", "see plots.Reference"
-        ) from error
-    if values.shape[1] != len(names):
-        raise InvalidInput(
-            "reference",
-            str(path),
-            f"must have {len(names)} columns as its header has, not {values.shape[1]}",
-            "see plots.Reference",
-        )
-    return dict(zip(names, values.T, strict=True))
 
 
 def plot(
@@ -301,10 +255,10 @@ def surface(run: Run, *, reference: Reference | None = None, stage: str | None =
         label += f" (below {PGA_CORNER:g} Hz: {smooth:.3f} g)"
     top.plot(history.time, history.values, color=OURS, label=label)
     if reference is not None:
-        values = _column_of(reference.histories, "acc_surface_g")
+        values = column_of(reference.histories, "acc_surface_g")
         label = f"reference, peak {np.abs(values).max():.3f} g"
         top.plot(
-            _column_of(reference.histories, "time_s"), values, color=REFERENCE, lw=0.7, ls="--", label=label
+            column_of(reference.histories, "time_s"), values, color=REFERENCE, lw=0.7, ls="--", label=label
         )
     top.set(ylabel="horizontal acceleration, g", xlim=(0.0, history.time[-1]))
     top.legend(loc="upper right")
@@ -320,8 +274,8 @@ def surface(run: Run, *, reference: Reference | None = None, stage: str | None =
         shaken = motion.response_spectrum()
         right.semilogx(shaken.periods, shaken.psa_g, color=INPUT, label=f"{motion.kind} motion")
     if reference is not None:
-        periods = _column_of(reference.spectrum, "period_s")
-        values = _column_of(reference.spectrum, "psa_surface_g_5pct")
+        periods = column_of(reference.spectrum, "period_s")
+        values = column_of(reference.spectrum, "psa_surface_g_5pct")
         right.semilogx(periods, values, color=REFERENCE, ls="--", label="reference, surface")
     right.set(
         xlabel="period, s",
@@ -345,7 +299,7 @@ def pore_pressure(run: Run, *, reference: Reference | None = None, stage: str | 
         axes.plot(history.time, history.values, color=OURS, label="sandboil", zorder=3)
         name = f"ru_{depth:g}m"
         if reference is not None and name in reference.histories:
-            time = _column_of(reference.histories, "time_s")
+            time = column_of(reference.histories, "time_s")
             axes.plot(time, reference.histories[name], color=REFERENCE, ls="--", label="reference", zorder=4)
         axes.axhline(1.0, color="black", lw=0.6, ls=":")
         axes.set(ylabel="$r_u$", ylim=(min(0.0, history.values.min()), max(1.1, history.values.max())))
@@ -524,7 +478,7 @@ def stress_paths(run: Run, *, reference: Reference | None = None, stage: str | N
         )
         if reference is not None and f"tau_kPa_{depth:g}m" in reference.stress_strain:
             their_tau, their_sigma, their_gamma = (
-                _column_of(reference.stress_strain, f"{name}_{depth:g}m")
+                column_of(reference.stress_strain, f"{name}_{depth:g}m")
                 for name in ("tau_kPa", "sv_eff_kPa", "gamma")
             )
             left.plot(their_sigma, their_tau, color=REFERENCE, lw=0.6, label="reference")
@@ -536,9 +490,3 @@ def stress_paths(run: Run, *, reference: Reference | None = None, stage: str | N
         left.set_title(f"{depth:g} m below the surface", loc="left", fontsize=9)
     panels[0, 1].legend(loc="upper left")
     return figure
-
-
-def _column_of(table: dict[str, Floats], name: str) -> Floats:
-    if name not in table:
-        raise InvalidInput("reference", ", ".join(table), f"must have a column {name}")
-    return table[name]
