@@ -6,7 +6,6 @@ import math
 import os
 import warnings
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,9 +16,7 @@ from .._types import Floats
 from ..files.fingerprint import fingerprint
 from ..ground.discretise import discretise
 from ..run.columns import HANDS, ColumnRecord
-from ..run.columns import INTERVAL as COLUMN_INTERVAL
-from ..run.columns import key as column_key
-from ..run.columns import load as load_columns
+from ..run.columns import prepare as prepare_columns
 from ..scene.stages import AnyStage, Gravity, Seepage
 from .description import condition_description, section_description, stage_description
 from .doubts import doubts
@@ -120,7 +117,11 @@ class Simulation:
         self._grains: _core.Simulation | None = None
         self._columns: list[tuple[str, str, str]] = []
         if scene.seepage is None:
-            self._columns = self._use_columns(self._section, columns, keep_columns)
+            stages = dict(zip(scene.stage_names, self._stages, strict=True))
+            if columns is not None or keep_columns:
+                self._columns = prepare_columns(
+                    self._section, stages, scene.statics.tolerance, columns, keep_columns
+                )
             self._grains = _core.Simulation(self._section, threads)
         self._index = -1
         self._begin_next_stage()
@@ -338,36 +339,6 @@ class Simulation:
         if self._grains is None:
             raise SandboilError(f"{self.stage!r} is computed without the grains")
         return self._grains
-
-    def _use_columns(
-        self, section: dict[str, Any], read: str | os.PathLike[str] | None, keep: bool
-    ) -> list[tuple[str, str, str]]:
-        """Stage, side and fingerprint of every free-field column; prepares what is read and recorded."""
-        if read is None and not keep:
-            return []
-        stages = dict(zip(self.scene.stage_names, self._stages, strict=True))
-        keys = [
-            (name, hand, column_key(section, stage, hand, self.scene.statics.tolerance))
-            for name, stage in stages.items()
-            if stage is not None
-            for hand, side in zip(HANDS, stage["sides"], strict=True)
-            if side == "free-field"
-        ]
-        if not keys:
-            name, value = ("columns", str(read)) if read is not None else ("keep_columns", keep)
-            raise InvalidInput(
-                name,
-                value,
-                "needs a shaking stage beside free-field sides; this scene has none",
-                "leave it out",
-            )
-        found = {} if read is None else load_columns(Path(read), keys)
-        for name, stage in stages.items():
-            if stage is not None:
-                kept = [found.get((name, hand)) for hand in HANDS]
-                stage["column_records"] = tuple(None if one is None else one.core() for one in kept)
-                stage["record_columns"] = COLUMN_INTERVAL if keep else None
-        return keys
 
     def take_columns(self) -> list[tuple[str, str, str, ColumnRecord]]:
         """Stage, side, fingerprint and record of the present stage's columns, if they are kept; once."""

@@ -6,6 +6,7 @@ same. What stands between the sides may differ: a dam with and without its berm.
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -110,6 +111,44 @@ def key(section: dict[str, Any], stage: dict[str, Any], hand: str, tolerance: fl
     return fingerprint(described)
 
 
+def prepare(
+    section: dict[str, Any],
+    stages: dict[str, dict[str, Any] | None],
+    tolerance: float,
+    read: str | os.PathLike[str] | None,
+    keep: bool,
+) -> list[tuple[str, str, str]]:
+    """Add to the descriptions of stages the columns that are read, and whether they are recorded.
+
+    `stages` are by name, None where the ground does not move; the others are as for :func:`key`. Returns
+    stage, side and fingerprint of every column. Raises :class:`InvalidInput` if there is none, or if those
+    to read are not in the folder.
+    """
+    moving = {name: stage for name, stage in stages.items() if stage is not None}
+    keys = [
+        (name, hand, key(section, stage, hand, tolerance))
+        for name, stage in moving.items()
+        for hand, side in zip(HANDS, stage["sides"], strict=True)
+        if side == "free-field"
+    ]
+    if not keys:
+        name, value = ("columns", str(read)) if read is not None else ("keep_columns", keep)
+        raise InvalidInput(
+            name, value, "needs a shaking stage beside free-field sides; this scene has none", "leave it out"
+        )
+    records = {} if read is None else load(read, keys)
+    for name, stage in moving.items():
+        of_stage = [records.get((name, hand)) for hand in HANDS]
+        stage["column_records"] = tuple(None if one is None else one.core() for one in of_stage)
+        stage["record_columns"] = INTERVAL if keep else None
+    return keys
+
+
+def _place(stage: str, hand: str) -> str:
+    """The group of a column in the file."""
+    return f"{stage}/{hand}"
+
+
 def save(folder: Path, stage: str, hand: str, fingerprint: str, record: ColumnRecord) -> None:
     """Put a stage's column into the file of a folder, in place of one that is there.
 
@@ -120,9 +159,10 @@ def save(folder: Path, stage: str, hand: str, fingerprint: str, record: ColumnRe
     if path.exists():
         shutil.copyfile(path, part)
     with h5py.File(part, "a" if path.exists() else "w", libver=LAYOUT) as file:
-        if f"{stage}/{hand}" in file:
-            del file[f"{stage}/{hand}"]
-        group = file.create_group(f"{stage}/{hand}")
+        place = _place(stage, hand)
+        if place in file:
+            del file[place]
+        group = file.create_group(place)
         group.attrs["key"] = text(fingerprint)
         group.attrs["interval_s"] = record.interval
         group.attrs["wet"] = record.wet
@@ -133,7 +173,7 @@ def save(folder: Path, stage: str, hand: str, fingerprint: str, record: ColumnRe
 
 
 def load(
-    folder: str | Path, fingerprints: Sequence[tuple[str, str, str]]
+    folder: str | os.PathLike[str], fingerprints: Sequence[tuple[str, str, str]]
 ) -> dict[tuple[str, str], ColumnRecord]:
     """The columns of (stage, hand, fingerprint) kept in a folder, by stage and hand.
 
@@ -143,7 +183,7 @@ def load(
     if not path.is_file():
         raise InvalidInput(
             "columns",
-            str(folder),
+            os.fspath(folder),
             f"must be the folder of a run that kept its columns, but has no {FILE_NAME}",
             "run that scene with keep_columns=True",
         )
@@ -151,12 +191,12 @@ def load(
     with opened(path, "columns") as file:
         refuse_foreign(file, "columns")
         for stage, hand, fingerprint in fingerprints:
-            group = file.get(f"{stage}/{hand}")
+            group = file.get(_place(stage, hand))
             if group is None or text_of(group.attrs["key"]) != fingerprint:
                 found = "no column" if group is None else "a column of other ground, motion or numerics"
                 raise InvalidInput(
                     "columns",
-                    str(folder),
+                    os.fspath(folder),
                     f"must hold the scene's own columns, but has {found} on the {hand} in {stage!r}",
                     "leave columns out: they are then computed, which takes a few per cent of a run",
                 )
