@@ -387,7 +387,7 @@ def test_only_what_the_scene_requires_is_active() -> None:
     rayleigh = Rayleigh(ratio=0.005, frequencies=(1.0, 10.0))
     viscous = column(stages=[Gravity(), Shaking(duration=1.0, rayleigh=rayleigh)])
     assert ("Rayleigh damping", True, "0.5 % at 1 and 10 Hz") in viscous.active_physics()
-    assert ("Rayleigh damping", False, "no shaking stage asks for it") in column().active_physics()
+    assert ("Rayleigh damping", False, "no shaking stage has it") in column().active_physics()
 
 
 @pytest.mark.parametrize(

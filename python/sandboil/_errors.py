@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 # Similarity below which a suggestion would puzzle more than help (difflib ratio, 0 to 1).
 _NEAREST_CUTOFF = 0.5
-# Longest name compared with others, characters: no name of ours is longer, and comparing takes their product.
+# Longest name that is compared, characters: no known name is longer, and the cost is the product of lengths.
 _LONGEST_NAME = 100
 
 # How much of a refused value a message shows: a few lines, however large the value is.
@@ -53,7 +53,7 @@ class InvalidInput(SandboilError, ValueError):
 
 
 class SimulationDiverged(SandboilError):
-    """A field became infinite or not a number during a run; what was computed before is kept.
+    """A field is no longer finite or bounded; what was computed before is kept.
 
     Attributes
     ----------

@@ -105,7 +105,7 @@ def run(
         float, typer.Option(help="Wall time between checkpoints, s.")
     ] = checkpoint.SECONDS,
     checkpoint_time: Annotated[
-        float | None, typer.Option(help="Also so often in the time of shaking, s.")
+        float | None, typer.Option(help="Simulated time between checkpoints, s.")
     ] = None,
 ) -> None:
     """Compute a scene. Ctrl-C ends it with readable results; --resume continues it."""

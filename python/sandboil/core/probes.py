@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Probe:
-    """A point where histories are taken: its initial place (m) and how the scene speaks of it."""
+    """A point where histories are taken: its name and its initial place, m."""
 
     label: str
     x: float

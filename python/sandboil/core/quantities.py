@@ -48,7 +48,7 @@ FIELDS: dict[str, Quantity] = {
 # Fields that exist only with water.
 WATER_FIELDS = ("excess_pore_pressure", "pore_pressure", "r_u")
 
-# Fields of water that flows through ground at rest.
+# Fields of a seepage stage.
 SEEPAGE_FIELDS = ("pore_pressure", "head", "saturation")
 
 # Fields with two components.

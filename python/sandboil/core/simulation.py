@@ -64,10 +64,10 @@ class Simulation:
     ----------
     scene : as given
     particles : the nodes and their geostatic state
-    probes : where histories are taken
+    probes : points of the histories
     threads : that share the work
     motions : the horizontal motion of every stage, for all of the base; None without one
-    doubts : why an answer may not be what was meant; each is also warned of as :class:`SandboilWarning`
+    doubts : why an answer may not be what was meant; each is also a :class:`SandboilWarning`
 
     Raises
     ------

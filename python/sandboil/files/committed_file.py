@@ -1,4 +1,4 @@
-"""A growing file that can be opened at any moment, also after the process that wrote it was killed."""
+"""A growing file that can be opened at any moment, also after a kill of the process that wrote it."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _NEW = os.O_RDWR | os.O_CREAT | os.O_TRUNC
 
 
 def twin_of(path: Path) -> Path:
-    """The copy beside a committed file, which is there while somebody writes and after a kill."""
+    """The copy beside a committed file, which exists during writing and after a kill."""
     return path.with_name(f".{path.name}.twin")
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the disk hold the names in a folder."""
+    """Flush the names in a folder to the disk."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -27,11 +27,11 @@ def sync_folder(folder: Path) -> None:
 
 
 class CommittedFile(io.RawIOBase):
-    """A file whose content changes on disk from one commit to the next, and never in between.
+    """A file whose content on disk changes by commits only.
 
-    What is written stays in memory until :meth:`commit`. On disk are two copies: the one that has the name,
-    which nobody writes to, and its twin. A commit brings the twin up to date and exchanges the names. HDF5
-    writes through this, so a full disk meets the commit and not HDF5.
+    Data written stay in memory until :meth:`commit`. On disk are two copies: the one with the file's name,
+    which is only read, and its twin. A commit updates the twin and exchanges the names. HDF5 writes through
+    this object, so a full disk makes the commit fail, and not HDF5.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class CommittedFile(io.RawIOBase):
             self.close()
             raise
 
-    # What HDF5 asks for
+    # Methods that HDF5 calls
 
     def readable(self) -> bool:
         return True
@@ -108,7 +108,7 @@ class CommittedFile(io.RawIOBase):
 
     def truncate(self, size: int | None = None) -> int:
         size = self._position if size is None else size
-        # What is cut off is nothing when the file grows again.
+        # Bytes that are cut off are zero when the file grows again.
         for page in range(size // _PAGE, -(-self._size // _PAGE)):
             kept = max(0, size - page * _PAGE)
             self._changed[page] = self._page(page)[:kept].ljust(_PAGE, b"\0")
@@ -126,7 +126,7 @@ class CommittedFile(io.RawIOBase):
     # Committing
 
     def commit(self) -> None:
-        """Make the file on disk what has been written. It was what the last commit made it until then."""
+        """Write all changes to the disk. Until the end of this call the file is that of the last commit."""
         assert self._twin is not None
         _write_pages(self._twin, self._behind | self._changed)
         os.ftruncate(self._twin, self._size)
@@ -142,7 +142,7 @@ class CommittedFile(io.RawIOBase):
         self._behind, self._changed = self._changed, {}
 
     def _exchange_names(self) -> None:
-        """Exchange the names of the copies; the file is there at every moment."""
+        """Exchange the names of the copies; the file exists at every moment."""
         self._spare.unlink(missing_ok=True)
         try:
             self._spare.hardlink_to(self._path)
@@ -154,16 +154,16 @@ class CommittedFile(io.RawIOBase):
 
     @property
     def _spare(self) -> Path:
-        """A name for the instant of an exchange."""
+        """A third name, used during an exchange."""
         return self._path.with_name(f".{self._path.name}.spare")
 
     def close(self) -> None:
-        """Leave the file as it was committed, without a twin. Nothing happens to a file closed already."""
+        """Close the file as it was committed, and remove its twin. A closed file stays as it is."""
         if not self.closed:
             for handle in (self._committed, self._twin):
                 if handle is not None:
                     os.close(handle)
-            # A twin whose file is missing is all that there is.
+            # A twin whose file is missing is the only copy.
             if self._committed is None or self._path.exists():
                 self._twin_path.unlink(missing_ok=True)
                 self._spare.unlink(missing_ok=True)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from .._errors import InvalidInput
 
-# Largest file of text taken, bytes: a motion of two million samples fits as rows of three full numbers and as
-# numbers in a scene; what it becomes in memory stays far below that of a usual computer.
+# Largest input file, bytes: a motion of two million samples fits as rows of three full numbers and as
+# numbers in a scene; read into memory it is far smaller than the memory of a usual computer.
 MAX_FILE_BYTES = 100_000_000
 
 
@@ -17,7 +17,7 @@ def read_bytes(path: str | os.PathLike[str], label: str, form: str) -> bytes:
     name = os.fspath(path)
     try:
         with Path(path).open("rb") as file:
-            # Some files have no size that could be asked for before, and no end.
+            # Some files, as devices, have no size and no end.
             content = file.read(MAX_FILE_BYTES + 1)
     except (OSError, ValueError) as error:
         # A name with a zero byte is a ValueError.

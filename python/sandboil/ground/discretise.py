@@ -25,7 +25,7 @@ class Discretisation:
     Attributes
     ----------
     position : (n, 2) m
-    volume : (n,) m3 per metre of thickness: a cell, save above a base that is not level
+    volume : (n,) m3 per metre of thickness: a cell, but for those above a base that is not level
     region : (n,) index into scene.regions
     spacing : (dx, dy) m, as close to scene.spacing as divides the section evenly
     bounds : (x0, x1, y0, y1) of the section, m
@@ -35,7 +35,7 @@ class Discretisation:
     saturation0 : (n,) degree of saturation at rest; None if all pores are full
     porosity0 : (n,)
     dry_density, solid_density : (n,) Mg/m3
-    overburden : the geostatic state from which the two stresses come
+    overburden : the geostatic state that gives the two stresses
     """
 
     position: Floats
@@ -57,7 +57,7 @@ class Discretisation:
         return self.overburden.stress_at(np.asarray(points, dtype=np.float64))
 
     def with_pore_water(self, pressure: Floats, saturation: Floats) -> Discretisation:
-        """The same section with other pore water, (n,) kPa and (n,): its stresses at rest follow."""
+        """The same section with other pore water, (n,) kPa and (n,), and the stresses at rest that follow."""
         unit_weight = self.overburden.water_unit_weight
         water = PoreWater.of(
             self.position, pressure, saturation, self.porosity0, unit_weight, self.spacing[1]

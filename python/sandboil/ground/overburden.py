@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Overburden:
-    """Weight standing above any point of a scene, from the exact outlines of its regions.
+    """Weight of the ground above any point of a scene, from the exact outlines of its regions.
 
     Stress and pressure in kPa, compression positive. The integral runs straight down, which is the geostatic
-    state of level ground; under slopes it is the start from which the gravity stage finds rest.
+    state of level ground; under slopes it is the initial state of the gravity stage.
     """
 
     outlines: NDArray[np.object_]
@@ -82,7 +82,7 @@ class Overburden:
         pressure = self.pore_pressure(points)
         if self.pore_water is not None:
             surface = self.surface_elevation(x)
-            # Where water stands on the ground its weight is the pressure there.
+            # The weight of water above the ground is the pressure at the surface.
             pond = np.maximum(self.pore_water.state(np.column_stack([x, surface]))[0], 0.0)
             total += np.where(y < surface, pond, np.maximum(pressure, 0.0))
         elif self.water_level is not None:
@@ -90,14 +90,14 @@ class Overburden:
             total += self.water_unit_weight * pond
         if self.pore_water is None:
             return total - pressure, pressure
-        # Bishop's stress: pores that hold air push with their share.
+        # Bishop's stress: the pressure of the water counts by its saturation.
         _, saturation = self.pore_water.state(points)
         return total - self.pore_water.missing_weight(points) - saturation * pressure, pressure
 
     def _verticals(self, x: Floats) -> tuple[NDArray[np.object_], NDArray[np.intp]]:
         """One vertical line through the whole section per distinct x, and the line of each point.
 
-        Points beyond a periodic side are taken where they lie inside, others beyond a side at that side.
+        Points beyond a periodic side are shifted into the section, others beyond a side to that side.
         """
         x0, y0, x1, y1 = self.bounds
         beyond = x0 + np.mod(x - x0, x1 - x0) if self.is_periodic else np.clip(x, x0, x1)

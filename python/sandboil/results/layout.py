@@ -201,7 +201,7 @@ class Seepage:
 
 
 class Vtk:
-    """The part that VTK reads, in VTK's own names. Its places have x, y and z: VTK knows no plane."""
+    """The part that VTK reads, in VTK's names. Its places have x, y and z, since VTK has no plane data."""
 
     GROUP = "VTKHDF"
     VERSION, TYPE = "Version", "Type"

@@ -354,21 +354,21 @@ def energy(run: Run, *, stage: str | None = None) -> Figure:
     history = run.energy(stage)
     figure = new_figure(8.0, 4.5)
     axes = figure.subplots()
-    taken = "velocity filter and Rayleigh damping"
+    dissipated = "velocity filter and Rayleigh damping"
     if _is_run_out(run, stage):
-        taken = "velocity filter, viscosity and edges"
+        dissipated = "velocity filter, viscosity and edges"
     # The work of gravity and that of the stress at rest cancel; alone they are far larger than the rest.
     parts = {
-        "came in": history["base"] + history["sides"],
+        "inflow": history["base"] + history["sides"],
         "motion": history["kinetic"],
         "soil": history["stress"] - sum(history[name] for name in CONSTANT_FORCES),
         "pore water": history["water"],
-        taken: history["damping"],
+        dissipated: history["damping"],
         "local damping": history["local_damping"],
     }
     for (name, values), colour in zip(parts.items(), ("black", *_CONDITIONS), strict=True):
         if np.any(values != 0.0):
-            axes.plot(history["time"], values, color=colour, label=name, lw=1.6 if name == "came in" else 1.0)
+            axes.plot(history["time"], values, color=colour, label=name, lw=1.6 if name == "inflow" else 1.0)
     axes.set(xlabel="time, s", ylabel="energy, kJ per m", xlim=(0.0, history["time"][-1]))
     axes.legend(loc="best")
     return figure

@@ -14,7 +14,7 @@ class History:
 
     Attributes
     ----------
-    name, unit, label : what it is, its unit, and where it was taken
+    name, unit, label : the quantity, its unit, and the point
     time : (m,) s, 0 at the beginning of the stage
     values : (m,)
     """

@@ -1,6 +1,6 @@
 """Free-field columns kept by one run and read by another, instead of being computed again.
 
-Two scenes share a column if the ground at the side, the motion that comes to it and the numerics are the
+Two scenes share a column if the ground at the side, the motion that reaches it and the numerics are the
 same. What stands between the sides may differ: a dam with and without its berm.
 """
 

@@ -64,10 +64,10 @@ def run(
     keep_columns : whether to keep the columns, in `free_field.h5`
     resume : continue the run of this scene in `out` from its last checkpoint; the results are the same bits
         as those of a run that was never stopped. A complete run is returned as it is
-    start : a run, or its folder, and a stage that it has ended: this run begins there, for example with the
-        ground at rest of another one. Everything up to there must be the same in both scenes
+    start : a run, or its folder, and a stage that it has completed: this run begins there, for example at the
+        state at rest of another one. Everything up to there must be the same in both scenes
     checkpoint_seconds : wall time between checkpoints, s; None: only at the end of stages, and if interrupted
-    checkpoint_time : also so often in the time of shaking, s
+    checkpoint_time : simulated time between checkpoints, s; None: without one
 
     Raises
     ------
@@ -75,7 +75,7 @@ def run(
         read or used, an unknown accuracy, a run to resume or start from that is not of this scene
     RunInterrupted : Ctrl-C or a request to terminate; the results are complete up to that moment, and the
         run can be resumed there
-    SimulationDiverged : a field lost its meaning; results and checkpoints until then are kept, and
+    SimulationDiverged : a field is no longer finite or bounded; results and checkpoints are kept, and
         `neighbourhood.csv` and `.png` show the nodes around the place
     SandboilError : the run stopped itself, or its folder could not be written; results until then are kept
 
@@ -187,7 +187,7 @@ def _only_user(folder: Path) -> Iterator[None]:
 
 
 def _earlier(folder: Path, simulation: Simulation) -> tuple[Run, checkpoint.Note | None]:
-    """The run in a folder, and the note of its last good state, which the simulation takes over.
+    """The run in a folder, and the note of its last sound state, which the simulation restores.
 
     No note of a complete run, nor of one that was stopped before its first checkpoint, which begins again.
     """

@@ -275,7 +275,7 @@ class Reservoir(_EdgeCondition):
 
 
 class SeepageFace(_EdgeCondition):
-    """A stretch of edge open to the air: water leaves it at zero pressure, none comes in."""
+    """A stretch of edge open to the air: water leaves it at zero pressure, none enters."""
 
     kind: Literal["seepage-face"] = "seepage-face"
 

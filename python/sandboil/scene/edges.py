@@ -114,7 +114,7 @@ class BaseSegment(Model):
 
 @dataclass(frozen=True)
 class Arrival:
-    """A stretch of the base and the wave that comes to it.
+    """A stretch of the base and the wave that reaches it.
 
     Attributes
     ----------

@@ -13,7 +13,7 @@ from .._types import MAX_PARTS, Many, Number, Point
 class Output(Model):
     """Results that a run keeps. They never change the time step.
 
-    Histories are taken at the surface, the base, the `depths` (m below ground, in the mid column) and the
+    Histories are recorded at the surface, the base, the `depths` (m below ground, in the mid column) and the
     `points` (x, y) every `history_dt` s; all fields every `field_dt` s; envelopes include every step.
     """
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 _DRY, _STILL = "the scene has no water", "no shaking stage"
 
-# Names of the facts that a plan can know better from a trial.
+# Name of the physics that a plan corrects by a trial.
 WATER_ACCELERATION = "water acceleration"
 
 
@@ -166,7 +166,7 @@ def _of_numerics(scene: Scene) -> list[Physics]:
             (not moves, _STILL),
             (numerics.local_damping == 0.0, "numerics.local_damping is 0"),
         ),
-        _physics("Rayleigh damping", "; ".join(damped), still, (not damped, "no shaking stage asks for it")),
+        _physics("Rayleigh damping", "; ".join(damped), still, (not damped, "no shaking stage has it")),
         _physics(
             "dispersion correction",
             "numerics.dispersion_correction is true",

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _LEVEL_DIGITS = 5
 
 
-# A scene asks for these many times; scenes made from one another mostly have the same shapes.
+# Called many times for a scene; scenes made from one another mostly have the same shapes.
 @functools.lru_cache(maxsize=8)
 def joined(shapes: tuple[Box | Polygon, ...]) -> BaseGeometry:
     """Shapes joined into one."""

@@ -55,7 +55,7 @@ class _Stage(Model):
 
 
 class Seepage(_Stage):
-    """Water that flows through the ground at rest, before anything moves.
+    """Water that flows through the ground at rest, before the other stages.
 
     Without a `duration` (s) the steady state, found without time. It starts from the scene's water table at
     rest, and its final pore water is that of the stages that follow.

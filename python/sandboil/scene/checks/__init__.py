@@ -16,7 +16,7 @@ from .water import check_moving_water, check_seepage, check_water_table
 if TYPE_CHECKING:
     from ..scene import Scene
 
-# In the order in which a user would mend what they refuse. Later ones rely on earlier ones.
+# In the order in which a user would correct the scene. Later checks rely on earlier ones.
 CHECKS: tuple[Callable[[Scene], None], ...] = (
     check_names,
     check_size,
