@@ -324,7 +324,7 @@ def test_results_that_cannot_be_read_are_those_of_their_twin(
         load(tmp_path)
     # The twin is one commit behind, and so the newest checkpoint may be too far ahead.
     with (
-        pytest.warns(ResumeWarning, match="its second copy is taken"),
+        pytest.warns(ResumeWarning, match="its second copy is used"),
         pytest.warns(ResumeWarning, match="left out: .* ends before it"),
     ):
         run(scenes.column(), tmp_path, threads=1, resume=True)
