@@ -104,7 +104,15 @@ pub enum SolverError {
 }
 
 impl SolverError {
-    /// The quantity that lost its meaning in a soil model under way, the node and its value; `None` of other errors.
+    /// The error of a soil model with its node in the user's order: `order` has the user's index of each node.
+    pub(crate) fn in_user_order(mut self, order: &[usize]) -> Self {
+        if let Self::Soil { node, .. } = &mut self {
+            *node = order[*node];
+        }
+        self
+    }
+
+    /// Quantity, node and value of the error of a soil model in a step; `None` of other errors.
     pub(crate) fn soil_divergence(&self) -> Option<(&'static str, usize, f64)> {
         match self {
             Self::Soil { node, source: SoilError::StrainIncrementTooLarge { value, .. }, .. } => {

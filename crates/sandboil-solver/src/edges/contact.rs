@@ -4,7 +4,7 @@
 use crate::edges::dashpots::NodalMotion;
 use crate::section::{
     description::Model,
-    outline::{Hand, Outline},
+    outline::{Hand, Outline, Side},
 };
 use sandboil_sph::Vec2;
 
@@ -24,7 +24,7 @@ pub fn stick_to_edges(
             let beyond = outline.base_elevation(to.x) > to.y;
             (beyond || (to - foot).norm() < least) && (to - from).dot(&outline.base_normal(to.x)) > 0.0
         });
-        let nears_side = |(hand, side): (Hand, &Option<crate::Side>)| {
+        let nears_side = |(hand, side): (Hand, &Option<Side>)| {
             side.is_some_and(|side| {
                 let out = hand.normal().x;
                 (side.extent[0]..=side.extent[1]).contains(&to.y)
@@ -48,15 +48,14 @@ pub fn stick_to_edges(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::square_block;
+    use crate::{section::outline::Support, testing::square_block};
 
     /// A grain that flies to the base or to a wall stops before it; one that leaves goes on.
     #[test]
     fn grains_stick_to_edges() {
         let mut model = square_block(1);
         model.outline = Outline::level(0.0);
-        model.outline.sides[1] =
-            Some(crate::Side { x: 5.0, extent: [0.0, 3.0], support: crate::Support::FreeSlip });
+        model.outline.sides[1] = Some(Side { x: 5.0, extent: [0.0, 3.0], support: Support::FreeSlip });
         let stopped = |at: Vec2, velocity: Vec2| {
             let (mut v, mut a) = ([velocity], [Vec2::zeros()]);
             let count = stick_to_edges(

@@ -83,7 +83,6 @@ impl FreeField {
             let column = &self.columns[side.column];
             side.tables = SideTables::new(section, side.hand);
             side.force = vec![Vec2::zeros(); side.tables.nodes.len()];
-            side.targets = vec![0.0; side.dashpots.all().len()];
             side.begin_increments(column);
         }
     }
@@ -148,6 +147,7 @@ impl Neighbour for FreeField {
             return Ok(None);
         }
         free_field.begin(section, stage)?;
+        free_field.renew_tables(section);
         Ok(Some(free_field))
     }
 
@@ -165,9 +165,13 @@ impl Neighbour for FreeField {
                     .map_err(|error| on_side(hand, side.x, error))?;
             }
             (self.sides[k].dashpots, self.sides[k].trace) =
-                side_dashpots(section, (hand, side), &self.columns[column])?;
+                side_dashpots(section, hand, side, &self.columns[column])
+                    .map_err(|error| on_side(hand, side.x, error))?;
         }
-        self.renew_tables(section);
+        for side in &mut self.sides {
+            side.targets = vec![0.0; side.dashpots.all().len()];
+            side.begin_increments(&self.columns[side.column]);
+        }
         Ok(())
     }
 
@@ -426,7 +430,8 @@ fn same_column(a: &Model, b: &Model) -> bool {
 /// their points over the rows of the column.
 fn side_dashpots(
     section: &SectionView,
-    (hand, side): (Hand, Side),
+    hand: Hand,
+    side: Side,
     column: &Column,
 ) -> Result<(Dashpots, Csr<f64>), SolverError> {
     let SectionView { model, position, edges, .. } = section;

@@ -66,13 +66,14 @@ impl<N: Neighbour> Driver<N> {
         let stage = stage.into();
         stage.validate()?;
         rules::check(&Choices::of_stage(&self.domain.ground.model, &stage))?;
-        match stage.end {
+        let begun = match stage.end {
             End::AtRest { tolerance, max_steps } => {
                 self.gravity = Some(Gravity { tolerance, max_steps });
                 self.begin_statics(&stage, Relaxing::new(tolerance, max_steps))
             }
             End::After(_) => self.begin_motion(stage),
-        }
+        };
+        begun.map_err(|error| error.in_user_order(&self.domain.ground.order))
     }
 
     fn begin_statics(&mut self, stage: &Stage, relaxing: Relaxing) -> Result<(), SolverError> {
@@ -294,7 +295,6 @@ impl Domain {
         let section = self.ground.view(&outline);
         if let Some(mut neighbour) = before {
             neighbour.begin(&section, stage)?;
-            neighbour.couple(&mut self.ground.geometry, self.ground.model.nodes());
             return Ok(Some(neighbour));
         }
         let Some(mut neighbour) = N::new(&section, stage, gravity)? else { return Ok(None) };

@@ -120,7 +120,7 @@ impl Ground {
                 StressPoint { stress, ..StressPoint::default() }
             })
             .collect();
-        let soil = SoilField::elastic(&model, &mut points)?;
+        let soil = SoilField::elastic(&model, &mut points).map_err(|error| error.in_user_order(&order))?;
         Ok(Self {
             order,
             edges: EdgeNodes::new(&model),

@@ -240,7 +240,8 @@ impl<N: Neighbour> Driver<N> {
             xy: mean(one.xy, other.xy),
             zz: mean(one.zz, other.zz),
         };
-        self.domain.ground.impedance_at(node, stress)
+        let ground = &self.domain.ground;
+        ground.impedance_at(node, stress).map_err(|error| error.in_user_order(&ground.order))
     }
 
     /// Longest stable time step, s.

@@ -31,7 +31,7 @@ impl Phases {
     /// The undeformed section.
     pub fn new(model: &Model) -> Self {
         let volume = model.volume.clone();
-        let of_region = |value: &dyn Fn(&crate::Region) -> f64| -> Vec<f64> {
+        let of_region = |value: &dyn Fn(&crate::section::description::Region) -> f64| -> Vec<f64> {
             model.region.iter().map(|&region| value(&model.regions[region as usize])).collect()
         };
         let solidity = of_region(&|region| 1.0 - region.porosity);

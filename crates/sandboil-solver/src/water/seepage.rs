@@ -170,7 +170,7 @@ impl Seepage {
         let (model, order) = sorted(model);
         let conduction = static_conduction(&model);
         let cells = Cells::new(&model, &model.position, &boundaries, conduction.beyond())?;
-        let of_region = |value: &dyn Fn(&crate::Region) -> f64| -> Vec<f64> {
+        let of_region = |value: &dyn Fn(&crate::section::description::Region) -> f64| -> Vec<f64> {
             model.region.iter().map(|&region| value(&model.regions[region as usize])).collect()
         };
         let head = order

@@ -167,7 +167,7 @@ fn stages_and_renewals_strike_no_blow() {
         let apart = one.iter().zip(&other).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
         println!("{what}: {:.2} % of {peak:.3} m/s apart, {renewed} geometries", 100.0 * apart / peak);
         assert!(renewed > builds);
-        assert!(apart < 0.03 * peak, "{apart}");
+        assert!(apart < 0.01 * peak, "{apart}");
     }
 }
 

@@ -8,7 +8,7 @@ use sandboil_soil::{
     pm4sand::{Options, PM4Sand, Parameters},
 };
 use sandboil_solver::{
-    Conductivity, Gravity, HalfSpace, Model, Operators, Rayleigh, Simulation, UpgoingWave, Water,
+    Conductivity, Gravity, HalfSpace, Model, Operators, Rayleigh, Simulation, SolverError, UpgoingWave, Water,
 };
 use std::f64::consts::PI;
 
@@ -162,7 +162,7 @@ fn a_bursting_sand_column_is_told_at_once() {
     stage.time_step_factor = 3.0;
     simulation.begin(stage).unwrap();
     let error = simulation.advance(u64::MAX, f64::INFINITY).unwrap_err();
-    assert!(matches!(error, sandboil_solver::SolverError::Diverged { .. }), "{error}");
+    assert!(matches!(error, SolverError::Diverged { .. }), "{error}");
 }
 
 /// A state that has lost its meaning is told before anybody can read or store it, between the checks of every few steps.
@@ -176,9 +176,7 @@ fn no_state_is_handed_out_that_is_none() {
         velocity[7][0] = lost;
         simulation.set_velocity(&velocity).unwrap();
         let error = simulation.advance(1, f64::INFINITY).unwrap_err();
-        let sandboil_solver::SolverError::Diverged { quantity, step: 1, .. } = error else {
-            panic!("{error}")
-        };
+        let SolverError::Diverged { quantity, step: 1, .. } = error else { panic!("{error}") };
         assert_eq!(quantity, "velocity");
     }
 }
@@ -252,4 +250,23 @@ fn stresses_at_rest_that_the_soil_cannot_carry_are_counted() {
         let stress_nodes = 2.0 * model.position.len() as f64;
         assert_eq!(simulation.counters().inadmissible_starts as f64, share * stress_nodes, "{phi}");
     }
+}
+
+/// A soil that refuses the stress at the start of a stage is reported with the node in the user's order, which is not that of
+/// the solver: the column below is numbered from above.
+#[test]
+fn a_refused_stress_is_reported_with_the_users_node() {
+    let mut model = sand_column(Operators::Conservative);
+    model.position.reverse();
+    model.vertical_effective_stress.reverse();
+    model.pore_pressure.reverse();
+    model.regions[0].earth_pressure_coefficient = 1e10;
+    let wrong = 3;
+    model.vertical_effective_stress[2 * wrong] = 1e300;
+    let mut simulation = Simulation::new(&model, 1).unwrap();
+    let Err(SolverError::Soil { region: 0, node, .. }) = simulation.begin(shaking(None, 1.0, Vec::new()))
+    else {
+        panic!("the stress is not refused")
+    };
+    assert_eq!(node, wrong);
 }
