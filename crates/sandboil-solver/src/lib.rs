@@ -21,6 +21,7 @@ mod weights;
 
 pub use edges::base::{Base, BaseSegment, HalfSpace, Impedance, UpgoingWave, Vertical};
 pub use error::{SolverError, StateError};
+pub use neighbours::identity::column_identities;
 pub use run::{
     begin::ACCELERATION_TERM_CONDUCTIVITY, checkpoint, clock::Counters, observers::energy::ENERGY_NAMES,
     time_step::Criterion,

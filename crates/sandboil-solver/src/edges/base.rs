@@ -123,6 +123,11 @@ impl Base {
         }
     }
 
+    /// Whether the waves differ along the base, or reach it at different times.
+    pub fn has_passage(&self) -> bool {
+        self.segments.len() > 1 || self.segments.iter().any(|s| s.slowness != 0.0 || s.delay != 0.0)
+    }
+
     /// What comes to the place `x`, as a segment for all of a base.
     pub fn at(&self, x: f64) -> BaseSegment {
         let segment = self.segments.iter().find(|s| x <= s.extent[1]).or(self.segments.last());

@@ -66,8 +66,8 @@ struct CoupledSide {
     strained: Vec<usize>,
 }
 
-/// The segment of the base that the wave of a side passes.
-fn segment_at(stage: &Stage, x: f64) -> BaseSegment {
+/// The segment of the base through which the wave of a side arrives.
+pub fn segment_at(stage: &Stage, x: f64) -> BaseSegment {
     stage.compliant_base().map_or_else(|| BaseSegment::everywhere(None), |base| base.at(x))
 }
 
@@ -109,7 +109,7 @@ impl Neighbour for FreeField {
         let mut made: Vec<(Model, BaseSegment)> = Vec::new();
         for (hand, wanted) in Hand::BOTH.into_iter().zip(stage.free_field()) {
             let (true, Some(side)) = (wanted, section.outline.sides[hand as usize]) else { continue };
-            let model = column_model(section, hand);
+            let model = column_model(section.model, section.edges, hand);
             let segment = segment_at(stage, side.x);
             let same =
                 made.iter().position(|(other, arrival)| *arrival == segment && same_column(other, &model));
@@ -382,8 +382,7 @@ fn difference(a: &[f64; 4], b: &[f64; 4]) -> [f64; 4] {
 }
 
 /// The soil at a side as a column between periodic sides.
-fn column_model(section: &SectionView, hand: Hand) -> Model {
-    let SectionView { model, outline, edges, .. } = section;
+pub fn column_model(model: &Model, edges: &EdgeNodes, hand: Hand) -> Model {
     let nodes = &edges.sides[hand as usize];
     // The column starts where the section did: its rest is found on the undeformed lattice.
     let x = nodes.first().map_or(0.0, |&node| model.position[node].x);
@@ -402,10 +401,10 @@ fn column_model(section: &SectionView, hand: Hand) -> Model {
         saturation: pick(&model.saturation),
         period: Some(Period { width: model.spacing.x }),
         outline: Outline {
-            base_support: outline.base_support,
+            base_support: model.outline.base_support,
             ..Outline::level(model.outline.base_elevation(x))
         },
-        ..(*model).clone()
+        ..model.clone()
     }
 }
 

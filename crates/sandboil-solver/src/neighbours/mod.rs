@@ -2,4 +2,5 @@
 
 pub mod column;
 pub mod free_field;
+pub mod identity;
 pub mod side_tables;

@@ -1,7 +1,10 @@
 //! What may be read of a simulation: arrays in the user's node order, and quantities of a column for the section beside it.
 
 use crate::{
-    edges::{base::Impedance, compliant_base::CompliantBase},
+    edges::{
+        base::{Base, Impedance, Vertical},
+        compliant_base::CompliantBase,
+    },
     error::SolverError,
     run::{
         clock::Counters,
@@ -11,7 +14,7 @@ use crate::{
         simulation::{Active, Driver},
         time_step::{Criterion, PressureCoupling, TimeLimit},
     },
-    section::description::STRESS_NODES,
+    section::description::{Operators, STRESS_NODES},
     skeleton::{contacts::Contacts, point::StressPoint, printed::PrintedStress, rayleigh::RayleighDamping},
     water::pore_pressure::Flow,
 };
@@ -74,6 +77,38 @@ impl<N: Neighbour> Driver<N> {
         base.map_or_else(Vec::new, |base| {
             base.impedance().iter().map(|below| below.density * below.shear_speed).collect()
         })
+    }
+
+    /// Names of the physics that a stage may compute, and whether the present stage does.
+    pub fn physics(&self) -> Vec<(&'static str, bool)> {
+        let Domain { ground, damping, inertia, .. } = &self.domain;
+        let Ground { model, water, soil, sharpness, .. } = ground;
+        let stage = self.moving();
+        let base = stage.and_then(|stage| stage.stage.compliant_base());
+        let is = |test: fn(&Flow) -> bool| water.as_ref().is_some_and(test);
+        let holds_air = model.saturation.iter().any(|share| *share < 1.0);
+        vec![
+            ("pore water", model.water.is_some()),
+            ("water diffusion", is(Flow::is_drained)),
+            ("water acceleration", is(Flow::has_acceleration_term)),
+            (
+                "partial saturation",
+                holds_air || water.as_ref().is_some_and(|flow| flow.saturation().is_some()),
+            ),
+            ("soil state", soil.plastic_points() > 0),
+            ("base dashpots", base.is_some()),
+            ("vertical waves", base.is_some_and(|base| base.vertical == Vertical::Absorbing)),
+            ("wave passage", base.is_some_and(Base::has_passage)),
+            ("free-field columns", stage.is_some_and(|stage| stage.neighbour.is_some())),
+            ("local damping", damping.local > 0.0),
+            ("Rayleigh damping", damping.rayleigh.is_some()),
+            ("dispersion correction", inertia.is_some()),
+            ("run-out", sharpness.is_some()),
+            (
+                "velocity filter",
+                model.numerics.operators == Operators::Conservative && model.numerics.velocity_filter > 0.0,
+            ),
+        ]
     }
 
     /// Names and bytes of the arrays that exist: what a scene did not ask for is not in the list.

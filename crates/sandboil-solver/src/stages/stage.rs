@@ -201,17 +201,22 @@ impl Stage {
         }
     }
 
-    /// The same stage for a column between periodic sides, shaken by one segment of the base; `lowest` (m) is the
+    /// The same stage for a column between periodic sides, shaken by the wave of one segment of the base; `lowest` (m) is the
     /// elevation at which times of arrival hold unless the base says otherwise.
     #[must_use]
     pub fn of_column(&self, segment: BaseSegment, lowest: f64) -> Self {
         let base = match &self.edges.base {
             BaseEdge::Held => BaseEdge::Held,
-            BaseEdge::Compliant(base) => BaseEdge::Compliant(Base {
-                segments: vec![segment],
-                datum: Some(base.datum.unwrap_or(lowest)),
-                ..base.clone()
-            }),
+            BaseEdge::Compliant(base) => {
+                let wave = segment.wave.map(|wave| base.waves[wave].clone());
+                BaseEdge::Compliant(Base {
+                    vertical: base.vertical,
+                    half_space: base.half_space,
+                    segments: vec![BaseSegment { wave: wave.as_ref().map(|_| 0), ..segment }],
+                    waves: wave.into_iter().collect(),
+                    datum: Some(base.datum.unwrap_or(lowest)),
+                })
+            }
         };
         Self {
             edges: Edges { base, sides: [SideEdge::Held, SideEdge::Held] },

@@ -328,6 +328,16 @@ impl Flow {
         self.wetting.as_ref().map(|wetting| |node| wetting.saturation(node))
     }
 
+    /// Whether pore water flows between nodes.
+    pub fn is_drained(&self) -> bool {
+        self.diffusion.is_some()
+    }
+
+    /// Whether the acceleration term of Eq. 7 is part of the flow.
+    pub fn has_acceleration_term(&self) -> bool {
+        matches!(self.scheme, Scheme::Explicit { acceleration_term: true })
+    }
+
     /// The scheme in the user's words.
     pub fn scheme_name(&self) -> &'static str {
         match self.scheme {

@@ -6,7 +6,8 @@ use crate::{
     waves::ricker,
 };
 use sandboil_solver::{
-    Base, Conductivity, Model, Region, Shaking, Side, SolverError, Support, UpgoingWave, Water,
+    Base, Conductivity, Gravity, Model, Region, Shaking, Side, SolverError, Support, UpgoingWave, Vec2,
+    Water, column_identities,
 };
 
 const HEIGHT: f64 = 10.0;
@@ -182,4 +183,39 @@ fn a_column_that_runs_away_is_told_when_the_step_returns() {
         panic!("no word of the column")
     };
     assert!(matches!(*source, SolverError::Diverged { quantity: "velocity", node: 0, .. }), "{source}");
+}
+
+/// What stands between the sides, and regions and waves that do not reach a column, are no part of its identity; its soil, its
+/// wave and the stage are.
+#[test]
+fn a_column_is_identified_by_what_moves_it() {
+    let model = block(HEIGHT, SPACING, 10, elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS), None);
+    let stage = on_free_field(shaking(Some(pulse(5.0, 0.1)), 0.5, Vec::new()));
+    let gravity = Gravity { tolerance: 1e-5, max_steps: 20_000 };
+    let of = |model: &Model, stage: &Shaking| column_identities(model, Some(gravity), stage.clone()).unwrap();
+    let [left, right] = of(&model, &stage);
+    assert!(left.is_some() && left == right);
+    let mut stiff_core = model.clone();
+    stiff_core.regions.insert(0, elastic(9.0 * SHEAR_MODULUS, 18.0 * SHEAR_MODULUS));
+    for (region, at) in stiff_core.region.iter_mut().zip(&model.position) {
+        *region = u32::from((at.x - 0.5 * 10.0 * SPACING).abs() > 2.0 * SPACING);
+    }
+    assert_eq!(of(&stiff_core, &stage), [left.clone(), right.clone()]);
+    let mut other_probes = stage.clone();
+    other_probes.output.probes.push(Vec2::zeros());
+    assert_eq!(of(&model, &other_probes)[0], left);
+    let mut one_side = stage.clone();
+    one_side.free_field[1] = false;
+    assert_eq!(of(&model, &one_side), [left.clone(), None]);
+    for changed in [
+        Shaking { base: Base::shaken_by(Some(pulse(5.0, 0.2))), ..stage.clone() },
+        Shaking { duration: 0.6, ..stage.clone() },
+        Shaking { local_damping: 0.1, ..stage.clone() },
+    ] {
+        assert_ne!(of(&model, &changed)[0], left);
+    }
+    let mut softer = model.clone();
+    softer.regions[0] = elastic(0.9 * SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
+    assert_ne!(of(&softer, &stage)[0], left);
+    assert_ne!(column_identities(&model, None, stage).unwrap()[0], left);
 }
