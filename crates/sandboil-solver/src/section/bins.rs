@@ -10,7 +10,7 @@ pub struct Bins {
 }
 
 impl Bins {
-    /// Bins of a size (m), at least the distance within which a point is looked for.
+    /// Sorts points into bins; `size` (m) is at least the search distance.
     pub fn new(points: &[Vec2], size: f64) -> Self {
         let mut bins = Self { size, bins: BTreeMap::new() };
         for (k, &at) in points.iter().enumerate() {
@@ -24,7 +24,8 @@ impl Bins {
         [at.x, at.y].map(|x| (x / self.size).floor() as i64)
     }
 
-    /// Index of the allowed point nearest to a place, within the size of a bin; the first of equals.
+    /// Index of the allowed point nearest to a place, within the size of a bin; the first of several at the
+    /// same distance.
     pub fn nearest(&self, points: &[Vec2], at: Vec2, allowed: impl Fn(usize) -> bool) -> Option<usize> {
         let [column, row] = self.bin(at);
         let distance = |k: usize| (points[k] - at).norm_squared();

@@ -4,7 +4,7 @@ use crate::{error::SolverError, section::outline::Outline};
 use sandboil_soil::{Soil, VanGenuchten};
 use sandboil_sph::{Mat2, Period, Vec2};
 
-/// Stress nodes carried by each velocity node.
+/// Stress nodes of each velocity node.
 pub const STRESS_NODES: usize = 2;
 /// Distance of a stress node from its velocity node over the particle spacing, along the diagonal (Section 3).
 const STRESS_NODE_DISTANCE: f64 = 1.0 / 3.0;
@@ -13,19 +13,19 @@ const STRESS_NODE_DISTANCE: f64 = 1.0 / 3.0;
 pub struct Conductivity {
     /// Largest.
     pub major: f64,
-    /// Smallest, at right angles.
+    /// Smallest, perpendicular to the largest.
     pub minor: f64,
-    /// Unit vector of the largest.
+    /// Direction of the largest, a unit vector.
     pub direction: Vec2,
 }
 
 impl Conductivity {
-    /// The same in all directions; zero is undrained.
+    /// Isotropic conductivity; zero is undrained.
     pub fn isotropic(value: f64) -> Self {
         Self { major: value, minor: value, direction: Vec2::new(1.0, 0.0) }
     }
 
-    /// Whether there is no direction.
+    /// Whether it is the same in all directions.
     pub fn is_isotropic(&self) -> bool {
         self.major == self.minor
     }
@@ -51,7 +51,7 @@ impl Conductivity {
     }
 }
 
-/// Departure of a direction's length from one that rounding may leave.
+/// Tolerance on the length of a direction, for rounding.
 const DIRECTION_TOLERANCE: f64 = 1e-9;
 /// One region: a soil with its densities and conductivity.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -64,9 +64,9 @@ pub struct Region {
     pub solid_density: f64,
     /// Hydraulic conductivity; zero is undrained.
     pub hydraulic_conductivity: Conductivity,
-    /// Water retention above the water table; none: always saturated.
+    /// Water retention above the water table; `None`: always saturated.
     pub retention: Option<VanGenuchten>,
-    /// Earth pressure coefficient of the geostatic start.
+    /// Earth pressure coefficient of the initial geostatic stress.
     pub earth_pressure_coefficient: f64,
     /// Poisson's ratio of the static stage; `K0 / (1 + K0)` keeps the earth pressure coefficient.
     pub static_poisson_ratio: f64,
@@ -93,7 +93,7 @@ pub enum Operators {
 /// How pore pressure diffuses in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Diffusion {
-    /// Implicit where it lengthens the step, explicit otherwise.
+    /// Implicit if that allows a longer time step, else explicit.
     Auto,
     /// Backward Euler on the pressure alone.
     Implicit,
@@ -125,17 +125,18 @@ pub struct Numerics {
     pub diffusion: Diffusion,
     /// Acceleration term of Eq. 7.
     pub acceleration_term: AccelerationTerm,
-    /// Whether inertia is corrected for the slowness of short waves (conservative operators only).
+    /// Whether inertia is corrected so that short waves are as fast as long ones (conservative operators
+    /// only).
     pub dispersion_correction: bool,
-    /// Strain since the last geometry at which lists and weights are rebuilt; none: that of the operators.
+    /// Strain at which lists and weights are rebuilt; `None`: the default of the operators.
     pub geometry_strain_limit: Option<f64>,
     /// Integrator of the sand model.
     pub integrator: sandboil_soil::Integrator,
 }
 
 impl Numerics {
-    /// Strain that the operators bear before lists and weights are rebuilt: the conservative set carries the
-    /// deformation and needs new neighbours only; the printed one errs by the strain itself.
+    /// Strain at which lists and weights are rebuilt. The conservative operators account for the deformation
+    /// and need a rebuild only for new neighbours; the error of the printed ones is as large as the strain.
     pub fn geometry_strain_limit(&self) -> f64 {
         self.geometry_strain_limit.unwrap_or(match self.operators {
             Operators::Conservative => 0.2,
@@ -151,7 +152,8 @@ pub struct Model {
     pub spacing: Vec2,
     /// Velocity nodes, m.
     pub position: Vec<Vec2>,
-    /// Volume per unit thickness of each, m2: a cell of the lattice, save above a base that cuts the cells.
+    /// Volume of each node per unit thickness, m2: a cell of the lattice, or what remains of it above a base
+    /// that cuts it.
     pub volume: Vec<f64>,
     /// Region of each velocity node.
     pub region: Vec<u32>,
@@ -159,12 +161,13 @@ pub struct Model {
     pub regions: Vec<Region>,
     /// Elevation of the ground surface above each velocity node, m.
     pub surface_elevation: Vec<f64>,
-    /// Vertical effective stress of the geostatic start at each stress node, kPa, compression positive. Stress
-    /// nodes `2 i` and `2 i + 1` belong to velocity node `i`, at plus and minus [`stress_node_offset`].
+    /// Vertical effective stress of the initial geostatic state at each stress node, kPa, compression
+    /// positive. Stress nodes `2 i` and `2 i + 1` belong to velocity node `i`, at plus and minus
+    /// [`stress_node_offset`].
     pub vertical_effective_stress: Vec<f64>,
     /// Pore pressure at rest at each velocity node, kPa, negative in suction; read only when there is water.
     pub pore_pressure: Vec<f64>,
-    /// Degree of saturation at rest of each velocity node; empty: all pores are full.
+    /// Degree of saturation at rest of each velocity node; empty if all pores are full.
     pub saturation: Vec<f64>,
     /// Pore water, if the section has any.
     pub water: Option<Water>,
@@ -178,7 +181,7 @@ pub struct Model {
     pub numerics: Numerics,
 }
 
-/// Offset of a node's first stress node; the second lies opposite (Section 3, Fig. 1).
+/// Offset of a node's first stress node; the second is on the opposite side (Section 3, Fig. 1).
 pub fn stress_node_offset(spacing: Vec2) -> Vec2 {
     spacing * (STRESS_NODE_DISTANCE * std::f64::consts::FRAC_1_SQRT_2)
 }
@@ -189,7 +192,7 @@ impl Model {
         self.position.len()
     }
 
-    /// Length that stands for the particle spacing where only one is meant, m.
+    /// Particle spacing where a single value is needed, m: the side of a square as large as a cell.
     pub fn mean_spacing(&self) -> f64 {
         self.cell().sqrt()
     }
@@ -216,7 +219,7 @@ impl Model {
         self.saturation.get(node).copied().unwrap_or(1.0)
     }
 
-    /// Part of the pore pressure at rest that pushes the grains apart, `S_r p` (Bishop's stress), kPa.
+    /// Part of the pore pressure at rest that enters the effective stress by Bishop, `S_r p`, kPa.
     pub fn neutral_stress(&self) -> Vec<f64> {
         self.pore_pressure.iter().enumerate().map(|(node, p)| self.saturation(node) * p).collect()
     }
@@ -226,8 +229,8 @@ impl Model {
         self.water.map_or(0.0, |water| water.bulk_modulus / porosity)
     }
 
-    /// Pressure diffusivity `kappa = k / C` of a region by a principal conductivity, m2/s, with the storage
-    /// `C = n gamma_f / K_f` of Eq. 3.
+    /// Pressure diffusivity `kappa = k / C` of a region for one of its principal conductivities, m2/s, with
+    /// the storage `C = n gamma_f / K_f` of Eq. 3.
     pub fn pressure_diffusivity(&self, region: usize, principal: impl Fn(Conductivity) -> f64) -> f64 {
         self.water.map_or(0.0, |water| {
             let Region { hydraulic_conductivity, porosity, .. } = self.regions[region];
@@ -238,7 +241,7 @@ impl Model {
     /// Checks every array and number.
     ///
     /// # Errors
-    /// [`SolverError::Shape`] or [`SolverError::InvalidInput`] with the first contradiction found.
+    /// [`SolverError::Shape`] or [`SolverError::InvalidInput`] for the first error found.
     pub fn validate(&self) -> Result<(), SolverError> {
         let nodes = self.nodes();
         let shapes = [
@@ -279,7 +282,7 @@ impl Model {
         }
         self.outline.validate()?;
         for region in &self.regions {
-            // Dry soil given by its weight alone counts as solid throughout; water needs pores.
+            // Dry soil that is given by its unit weight has porosity zero; a section with water needs pores.
             let least = if self.water.is_some() { f64::MIN_POSITIVE } else { 0.0 };
             if !(region.porosity >= least && region.porosity < 1.0) {
                 let expected = "in (0, 1), zero only in a dry section";

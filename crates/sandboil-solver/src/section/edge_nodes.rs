@@ -4,10 +4,10 @@ use crate::section::description::Model;
 use sandboil_sph::Vec2;
 use std::collections::BTreeMap;
 
-/// Height over the base up to which the lowest node of a column stands on it, in spacings: the one below it may have been
-/// left out for being almost on an inclined base.
+/// Largest height over the base, in spacings, at which a column's lowest node is a base node. Nodes that are
+/// nearer to an inclined base may have been left out.
 pub const FARTHEST_FROM_BASE: f64 = 2.0;
-/// The nodes along the edges, from which tractions are read and on which they act.
+/// The nodes along the edges: tractions are read from them and act on them.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct EdgeNodes {
     /// The lowest node of every column of the lattice, from left to right.
@@ -17,7 +17,7 @@ pub struct EdgeNodes {
 }
 
 impl EdgeNodes {
-    /// Finds them on the undeformed lattice.
+    /// Finds the nodes on the undeformed lattice.
     pub fn new(model: &Model) -> Self {
         let (spacing, outline) = (model.spacing, &model.outline);
         let first = model.position.iter().fold(Vec2::repeat(f64::INFINITY), |low, x| low.inf(x));
@@ -35,7 +35,7 @@ impl EdgeNodes {
             }
             for (nodes, side) in sides.iter_mut().zip(outline.sides) {
                 let Some(side) = side else { continue };
-                // The outermost column alone: the next one stands a spacing and a half away.
+                // Only the outermost column: the next one is a spacing and a half away.
                 let near = (at.x - side.x).abs() < spacing.x;
                 if near && (side.extent[0]..=side.extent[1]).contains(&at.y) {
                     nodes.push(node);
@@ -53,7 +53,7 @@ impl EdgeNodes {
         Self { base, sides }
     }
 
-    /// Points of the base below its nodes, m.
+    /// Points of the base below the base nodes, m.
     pub fn base_points(&self, model: &Model, position: &[Vec2]) -> Vec<Vec2> {
         let below =
             |&node: &usize| Vec2::new(position[node].x, model.outline.base_elevation(position[node].x));
@@ -69,7 +69,7 @@ mod tests {
         testing::square_block,
     };
 
-    /// Above a base that is not level the lowest nodes stand up to a quarter of a row off the lattice.
+    /// Above an uneven base the lowest nodes may be a quarter of a row off the lattice.
     #[test]
     fn no_row_along_a_side_is_lost_above_an_uneven_base() {
         const SIDE: usize = 5;

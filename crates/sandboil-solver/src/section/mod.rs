@@ -1,4 +1,4 @@
-//! The description of a section and what follows from it alone: outline, edges, order of the nodes.
+//! The description of a section, and what is derived from it alone: outline, edge nodes, order of the nodes.
 
 pub mod bins;
 pub mod description;

@@ -2,8 +2,8 @@
 
 use crate::section::description::{Model, STRESS_NODES};
 
-/// The model with nodes sorted by region, then by row and column of the lattice, and the user's index of each:
-/// soil loops run over contiguous rows of one law, and neighbours lie near in memory.
+/// The model with nodes sorted by region, then by row and column of the lattice, and the user's index of each
+/// node. Soil loops then run over contiguous rows of one soil model, and neighbours are close in memory.
 pub(crate) fn sorted(model: &Model) -> (Model, Vec<usize>) {
     let lowest = model.position.iter().map(|x| x.y).fold(f64::INFINITY, f64::min);
     let row = |i: usize| ((model.position[i].y - lowest) / model.spacing.y).round();

@@ -1,24 +1,24 @@
 //! The edges of a section that are not its ground surface, and the images that continue the soil beyond them
 //! (Section 4.1).
 //!
-//! Every node near an edge has an image on the other side, at the mirror point across the nearest point of the edge:
-//! what the paper calls a boundary particle, with the node itself as its virtual node. Values need no interpolation,
-//! on slopes and curves neither, and the force on an image goes back to its node by the transpose of the map.
+//! Every node near an edge has an image on the other side, mirrored at the nearest point of the edge. The
+//! paper calls the image a boundary particle and the node its virtual node. No values are interpolated, also
+//! at slopes and curves. The force on an image is added to its node by the transpose of the map.
 
 use crate::error::SolverError;
 use sandboil_sph::Vec2;
 
-/// What an edge is in statics.
+/// Support at an edge in the static stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Support {
-    /// Rough: nothing moves on it.
+    /// Rough: held in both directions.
     NoSlip,
-    /// Smooth: nothing crosses it. A roller.
+    /// Smooth, a roller: held in the normal direction.
     FreeSlip,
 }
 
 impl Support {
-    /// What it does to the ground at the edge.
+    /// The condition at the edge.
     pub fn condition(self) -> Condition {
         match self {
             Self::NoSlip => Condition::NoSlip,
@@ -30,15 +30,15 @@ impl Support {
 /// A vertical side.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Side {
-    /// Where it stands, m.
+    /// Position, m.
     pub x: f64,
-    /// Its lower and upper end, m.
+    /// Lower and upper end, m.
     pub extent: [f64; 2],
-    /// What it is in statics, and as long as it is a wall.
+    /// Support in statics, and in later stages unless it becomes a free-field side.
     pub support: Support,
 }
 
-/// Which of the two sides.
+/// One of the two sides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Hand {
     /// Low x.
@@ -48,10 +48,10 @@ pub enum Hand {
 }
 
 impl Hand {
-    /// Both, in the order of every pair of sides.
+    /// Both sides, in the order of all pairs of sides.
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
 
-    /// In the user's words.
+    /// Name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Left => "left",
@@ -71,16 +71,16 @@ impl Hand {
 /// The edges of a section.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outline {
-    /// Lower boundary from left to right, m; empty: none, the section floats.
+    /// Lower boundary from left to right, m; empty for a section without a base.
     pub base: Vec<Vec2>,
-    /// What the base is in statics.
+    /// Support of the base in statics.
     pub base_support: Support,
-    /// Left and right side; none where the section is periodic or ends freely.
+    /// Left and right side; `None` where the section is periodic or ends at a free surface.
     pub sides: [Option<Side>; 2],
 }
 
 impl Outline {
-    /// A level base on which soil stands without sides.
+    /// A level base without sides.
     pub fn level(elevation: f64) -> Self {
         Self {
             base: vec![Vec2::new(0.0, elevation), Vec2::new(1.0, elevation)],
@@ -94,10 +94,11 @@ impl Outline {
         Self { base: Vec::new(), base_support: Support::NoSlip, sides: [None, None] }
     }
 
-    /// Refuses what is no outline.
+    /// Refuses an invalid outline.
     ///
     /// # Errors
-    /// A base that does not run from left to right, sides without height, or that are no numbers.
+    /// A base that does not run from left to right, a side without height, or coordinates that are not
+    /// finite.
     pub fn validate(&self) -> Result<(), SolverError> {
         if self.base.len() == 1 {
             let (name, value) = ("base", 1.0);
@@ -106,7 +107,7 @@ impl Outline {
         for pair in self.base.windows(2) {
             if !(pair[1].x > pair[0].x) || !pair.iter().all(|point| point.y.is_finite()) {
                 let (name, value) = ("base", pair[1].x);
-                let expected = "finite points in the order of rising x";
+                let expected = "finite points with increasing x";
                 return Err(SolverError::InvalidInput { name, value, expected });
             }
         }
@@ -130,7 +131,7 @@ impl Outline {
         (self.base.iter().map(|point| point.y).fold(f64::NEG_INFINITY, f64::max) - self.lowest()).max(0.0)
     }
 
-    /// Elevation of the base at `x`, m; its end segments go on beyond its ends.
+    /// Elevation of the base at `x`, m; its end segments are extended beyond its ends.
     pub fn base_elevation(&self, x: f64) -> f64 {
         self.base_segment(x).map_or(f64::NEG_INFINITY, |[a, b]| a.y + (b.y - a.y) * (x - a.x) / (b.x - a.x))
     }
@@ -167,8 +168,8 @@ impl Outline {
     }
 }
 
-/// The nearest point of a line that runs from left to right and goes on beyond its ends, and the normal there on its
-/// right-hand side.
+/// The nearest point of a line that runs from left to right and is extended beyond its ends, and the normal
+/// there on the right-hand side of the line.
 pub(crate) fn nearest_on(line: &[Vec2], at: Vec2) -> Option<(Vec2, Vec2)> {
     let last = line.len().checked_sub(2)?;
     let candidate = |(k, pair): (usize, &[Vec2])| {
@@ -187,27 +188,27 @@ pub(crate) fn nearest_on(line: &[Vec2], at: Vec2) -> Option<(Vec2, Vec2)> {
         .min_by(|(a, _), (b, _)| (a - at).norm_squared().total_cmp(&(b - at).norm_squared()))
 }
 
-/// Outward normal of a stretch of base.
+/// Outward normal of a base segment, which runs along `along` from left to right.
 pub fn normal(along: Vec2) -> Vec2 {
     Vec2::new(along.y, -along.x).normalize()
 }
 
-/// What an edge does to the soil in a stage.
+/// Condition at an edge in a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Condition {
-    /// Held at zero velocity: images move against.
+    /// Zero velocity: images move in the opposite direction.
     NoSlip,
-    /// Held in its normal direction: images move as in a mirror.
+    /// Zero normal velocity: images move as in a mirror.
     FreeSlip,
-    /// Held vertically; the horizontal motion is left to tractions.
+    /// Zero vertical velocity; tractions act horizontally.
     VerticalRoller,
-    /// Left to tractions altogether.
+    /// Tractions act in both directions.
     Traction,
 }
 
 impl Condition {
-    /// Which components of the edge's own motion it leaves free.
-    pub fn leaves_free(self) -> [bool; 2] {
+    /// Components `(x, y)` in which the edge can move.
+    pub fn free_components(self) -> [bool; 2] {
         match self {
             Self::NoSlip | Self::FreeSlip => [false, false],
             Self::VerticalRoller => [true, false],
@@ -226,16 +227,32 @@ pub struct Walls {
 }
 
 impl Walls {
-    /// Every edge as its support says: the static stage.
+    /// Every edge on its support, as in the static stage.
     pub fn statics(outline: &Outline) -> Self {
         let side = |side: Option<Side>| side.map_or(Condition::NoSlip, |side| side.support.condition());
         Self { base: outline.base_support.condition(), sides: outline.sides.map(side) }
     }
 
-    /// The base let go, and those sides that become free-field sides.
+    /// The edges of a shaking stage: a base with the given condition, free-field sides under tractions.
     pub fn shaken(outline: &Outline, base: Condition, free_field: [bool; 2]) -> Self {
         let statics = Self::statics(outline).sides;
         let sides = [0, 1].map(|k| if free_field[k] { Condition::Traction } else { statics[k] });
         Self { base, sides }
+    }
+}
+
+/// The edges of a section: where they are, and their conditions.
+#[derive(Debug, Clone, Copy)]
+pub struct EdgesView<'a> {
+    /// Base and sides.
+    pub outline: &'a Outline,
+    /// Their conditions.
+    pub walls: Walls,
+}
+
+impl<'a> EdgesView<'a> {
+    /// Every edge on its support, as in the static stage.
+    pub fn statics(outline: &'a Outline) -> Self {
+        Self { outline, walls: Walls::statics(outline) }
     }
 }
