@@ -647,7 +647,7 @@ mod tests {
         section::{
             description::Conductivity,
             edge_nodes::EdgeNodes,
-            outline::{Condition, Outline, Walls},
+            outline::{Condition, EdgesView, Outline, Walls},
         },
         testing::square_block,
         weights::geometry::Geometry,
@@ -679,7 +679,7 @@ mod tests {
     fn flow_of(model: &Model, scheme: FlowScheme) -> (Flow, Geometry) {
         let phases = Phases::new(model);
         let walls = Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]);
-        let edges = (&model.outline, walls);
+        let edges = EdgesView { outline: &model.outline, walls };
         let geometry = Geometry::build(model, &model.position, &model.volume, edges, None);
         let section = drawn(model, &phases, &geometry, walls);
         let flow = Flow::new(section, scheme, &[]).unwrap().unwrap();
@@ -730,7 +730,7 @@ mod tests {
         let (mut flow, geometry) = flow_of(&model, FlowScheme::Undrained);
         assert_eq!(flow.stiffness[4], 8.0 / 0.5);
         let strained = StressPoint { strain: [0.0, -0.1, 0.0], ..StressPoint::default() };
-        phases.follow(&vec![strained; STRESS_NODES * model.nodes()]);
+        phases.update_volumes(&vec![strained; STRESS_NODES * model.nodes()]);
         let walls = Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]);
         flow.follow(drawn(&model, &phases, &geometry, walls), 0.0);
         let porosity = 1.0 - 0.5 * 0.1_f64.exp();

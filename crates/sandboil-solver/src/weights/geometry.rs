@@ -1,10 +1,10 @@
-//! Weight tables of the current geometry. They stay frozen while strains are small.
+//! Weight tables of the current geometry. They are kept while strains are small.
 
 use crate::{
     section::{
         description::{Model, Operators, STRESS_NODES},
         node_id::id,
-        outline::{Outline, Walls},
+        outline::EdgesView,
     },
     weights::{
         balance,
@@ -22,19 +22,19 @@ use std::collections::BTreeMap;
 /// Tables that only a section with water has.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct FlowTables {
-    /// `div v` at velocity nodes, component-wise weights with walls folded in (last term of Eq. 7). The
-    /// transposed table is weighted with the row's volume: it is the pressure force.
+    /// `div v` at velocity nodes, weights of each component, images included (last term of Eq. 7). The
+    /// transposed table is weighted with the row's volume: it gives the pressure force.
     pub divergence: Paired<Vec2>,
 }
 
 /// All weights of one geometry.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Geometry {
-    /// Gradient at stress nodes from velocity nodes, without walls.
+    /// Gradient at stress nodes from velocity nodes, without images.
     pub gradient: Paired<GradientWeight>,
     /// Position covariance `(xx, xy, yy)` of each stress node's stencil, m2: the filter's linear part.
     pub covariance: Vec<[f64; 3]>,
-    /// What the images beyond base and sides add.
+    /// Additional weights by the images beyond base and sides.
     pub wall: Paired<VectorWeight>,
     /// Flow tables, if there is water.
     pub flow: Option<FlowTables>,
@@ -46,37 +46,46 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Builds all tables at `position` for nodes of `volume` (m2). Lists of `previous` are kept while no node has left their skin.
+    /// Builds all tables at `position` for nodes of `volume` (m2). The lists of `previous` are reused if they
+    /// are still valid.
     pub fn build(
         model: &Model,
         position: &[Vec2],
         volume: &[f64],
-        (outline, walls): (&Outline, Walls),
+        edges: EdgesView,
         previous: Option<Self>,
     ) -> Self {
         let kernel = WendlandQuintic::new(model.smoothing_length());
-        // The lists may be older than the images' cut-off, so images reach one skin further than the kernel.
-        let around = Surroundings::new(position, outline, walls, kernel.support() + 2.0 * skin(model));
+        // Reused lists may contain nodes that have moved away from an edge, so images reach further than the
+        // kernel.
+        let around =
+            Surroundings::new(position, edges.outline, edges.walls, kernel.support() + 2.0 * skin(model));
         let stress_position = stress_node_positions(position, model.spacing);
         let list = previous
             .map(|geometry| geometry.list)
-            .filter(|list| list.hold(model, &around, position))
+            .filter(|list| list.are_valid(model, &around, position))
             .unwrap_or_else(|| Lists::build(model, &around, kernel.support(), position, &stress_position));
         let stencils = Stencils { around: &around, volume, kernel, period: model.period };
         let (gradient, covariance, wall_table) = match model.numerics.operators {
             Operators::Conservative => least_squares_tables(&stencils, &list.from_stress, &stress_position),
             Operators::Printed => printed_strain_tables(&stencils, &list.from_stress, &stress_position),
         };
-        let is_balanced = balance::is_needed(model, outline, walls);
+        let is_balanced = balance::is_needed(model, edges);
         let wall_table = if is_balanced {
-            let of_stress = (&list.from_stress, stress_position.as_slice());
-            wall_table.with_more(balance::corrections(model, outline, &stencils, of_stress))
+            let list = &list.from_stress;
+            wall_table.with_more(balance::corrections(
+                model,
+                edges.outline,
+                &stencils,
+                list,
+                &stress_position,
+            ))
         } else {
             wall_table
         };
         let flow = model.water.is_some().then(|| flow_tables(&stencils, &list.from_velocity, position));
         let printed = (model.numerics.operators == Operators::Printed)
-            .then(|| printed_tables(&stencils, &list, position, &stress_position, (outline, walls)));
+            .then(|| printed_tables(&stencils, &list, position, &stress_position, edges));
         let nodes = position.len();
         Self {
             gradient: Paired::new(gradient, nodes),
@@ -89,8 +98,8 @@ impl Geometry {
         }
     }
 
-    /// Adds weights of velocities beside those of the nodes, from index `nodes` on, to strain and divergence. No force goes
-    /// back to them.
+    /// Adds the weights of copied velocities, whose indices follow those of the nodes, to strain and
+    /// divergence. No force acts on the copies.
     pub fn add_copied_velocities(
         &mut self,
         strain: BTreeMap<usize, Vec<(u32, VectorWeight)>>,
@@ -102,18 +111,18 @@ impl Geometry {
         }
     }
 
-    /// Adds to the gradients at some stress nodes, and to the force that is their transpose.
+    /// Adds weights to the gradients at some stress nodes, and to the force, which is their transpose.
     pub fn enhance(&mut self, more: BTreeMap<usize, Vec<(u32, VectorWeight)>>, nodes: usize) {
         self.wall = Paired::new(self.wall.forward.with_more(more), nodes);
     }
 
-    /// The neighbour lists behind the tables.
+    /// The neighbour lists of the tables.
     pub fn lists(&self) -> &Lists {
         &self.list
     }
 
-    /// Bounds of the largest squared wave numbers that strain and divergence see, 1/m2 (Gershgorin): how sharp the weights
-    /// are. `volume` of the nodes, m2.
+    /// Upper bounds of the largest squared wave numbers of strain and divergence, 1/m2 (Gershgorin): how
+    /// sharp the weights are. `volume` holds the volumes of the nodes, m2.
     pub fn sharpness(&self, volume: &[f64]) -> [f64; 2] {
         let half = |s: usize| volume[s / STRESS_NODES] / STRESS_NODES as f64;
         let strain = |s: usize| -> f64 {
@@ -131,7 +140,7 @@ impl Geometry {
             let reach: Vec<f64> = (0..volume.len())
                 .map(|i| flow.divergence.forward.iter_row(i).map(|(_, w)| w.norm()).sum())
                 .collect();
-            // The transposed weights carry the volumes of their rows.
+            // The transposed weights include the volumes of their rows.
             let row = |j| flow.divergence.transposed.iter_row(j);
             let of_node = |j: usize| row(j).map(|(i, w)| w.norm() * reach[i]).sum::<f64>() / volume[j];
             (0..volume.len()).map(of_node).fold(0.0, f64::max)
@@ -139,7 +148,7 @@ impl Geometry {
         [skeleton, water]
     }
 
-    /// Pairs between stress and velocity nodes, images folded.
+    /// Pairs of a stress node and a velocity node; images count as their nodes.
     pub fn pairs(&self) -> usize {
         self.gradient.forward.entries()
     }
@@ -157,7 +166,7 @@ impl Geometry {
     }
 }
 
-/// Divergence at velocity nodes (Eq. 7), images folded.
+/// Divergence at velocity nodes (Eq. 7), images included.
 pub fn flow_tables(stencils: &Stencils, list: &NeighbourList, points: &[Vec2]) -> FlowTables {
     let mut divergence = Csr::with_capacity(points.len(), list.pairs());
     for (i, &at) in points.iter().enumerate() {

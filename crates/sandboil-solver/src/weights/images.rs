@@ -6,22 +6,23 @@ use crate::section::{
 };
 use sandboil_sph::{Mat2, Source, Vec2};
 
-/// What an image shows of its node.
+/// How an image depends on its node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Image {
-    /// Velocity of the image from that of its node.
+    /// Map from the velocity of the node to that of the image.
     pub map: Mat2,
     /// Which components of the velocity enter strain.
     pub strain: [bool; 2],
-    /// Which components enter the divergence that moves water. A component along an edge that is left to tractions
-    /// goes on beyond it, so that the row stays complete; one across it must not.
+    /// Which components enter the divergence that changes the pore pressure. At an edge under tractions the
+    /// component along the edge is continued beyond it, so that the row stays complete; the component across
+    /// it must not be.
     pub flow: [bool; 2],
     /// Whether the image lies beyond the base.
     pub below: bool,
 }
 
 impl Image {
-    /// Shows its node as it is.
+    /// Moves as its node.
     pub(crate) const WHOLE: Self =
         Self { map: Mat2::new(1.0, 0.0, 0.0, 1.0), strain: [true; 2], flow: [true; 2], below: false };
 
@@ -40,8 +41,8 @@ impl Image {
         Self { map, strain, flow, below }
     }
 
-    /// The image of an image: beyond a corner.
-    fn seen_in(self, other: Self) -> Self {
+    /// The image of this image across another edge: beyond a corner.
+    fn mirrored_by(self, other: Self) -> Self {
         let both = |a: [bool; 2], b: [bool; 2]| [a[0] && b[0], a[1] && b[1]];
         Self {
             map: other.map * self.map,
@@ -52,7 +53,7 @@ impl Image {
     }
 }
 
-/// Where an image is seen across an edge.
+/// Where the line from a node to its image crosses an edge.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Crossing {
     /// Point of the edge, m.
@@ -66,14 +67,14 @@ pub struct Crossing {
 pub struct Surroundings {
     /// Nodes, then images.
     pub sources: Vec<Source>,
-    /// What the images show, in the order of their sources.
+    /// The images, in the order of their sources.
     pub images: Vec<Image>,
-    /// The edge that an image is seen across, two beyond a corner; in the order of the images.
+    /// The edge between each image and its node, two beyond a corner; in the order of the images.
     pub crossings: Vec<[Option<Crossing>; 2]>,
 }
 
 impl Surroundings {
-    /// Nodes alone.
+    /// Nodes without images.
     pub fn bare(position: &[Vec2]) -> Self {
         let real = |(i, &position): (usize, &Vec2)| Source { owner: id(i), position, mirrored: false };
         Self {
@@ -86,7 +87,7 @@ impl Surroundings {
     /// Nodes and all images of those within `reach` of an edge, m.
     pub fn new(position: &[Vec2], outline: &Outline, walls: Walls, reach: f64) -> Self {
         let mut all = Self::bare(position);
-        // Images beyond the base, to be seen once more in the sides.
+        // Images beyond the base: the sides mirror them again.
         let mut below = vec![None; position.len()];
         for (i, &at) in position.iter().enumerate() {
             if let Some((foot, outward)) = outline.nearest_on_base(at)
@@ -111,7 +112,7 @@ impl Surroundings {
                     all.add(id(i), across(at), mirror, [Some(crossing), None]);
                     if let Some((place, image, base)) = below[i] {
                         let crossings = [Some(base), Some(crossing)];
-                        all.add(id(i), across(place), image.seen_in(mirror), crossings);
+                        all.add(id(i), across(place), image.mirrored_by(mirror), crossings);
                     }
                 }
             }
@@ -125,12 +126,12 @@ impl Surroundings {
         self.images.push(image);
     }
 
-    /// What the source shows of its node; none for the node itself.
+    /// The image at a source; `None` for a node.
     pub fn image(&self, source: u32) -> Option<&Image> {
         (source as usize).checked_sub(self.sources.len() - self.images.len()).map(|k| &self.images[k])
     }
 
-    /// Owners of all sources: the lists of another moment serve while these are the same.
+    /// Owners of all sources: neighbour lists are valid only for the same owners.
     pub fn owners(&self) -> impl Iterator<Item = u32> {
         self.sources.iter().map(|source| source.owner)
     }

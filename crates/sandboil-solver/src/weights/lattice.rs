@@ -3,7 +3,7 @@
 use crate::section::description::Model;
 use sandboil_sph::{Vec2, WendlandQuintic, operators::Member};
 
-/// Members of a stencil inside the undeformed lattice, at a place seen from one of its nodes, m.
+/// Members of a stencil inside the undeformed lattice; its centre `at` is given relative to a node, m.
 pub fn lattice(model: &Model, at: Vec2) -> Vec<Member> {
     let support = WendlandQuintic::new(model.smoothing_length()).support();
     let volume = model.cell();

@@ -1,9 +1,10 @@
-//! Neighbour lists with a skin: they serve until a node has moved by half of it.
+//! Neighbour lists with a skin: they are valid until a node has moved by half of it.
 
 use crate::{section::description::Model, weights::images::Surroundings};
 use sandboil_sph::{NeighbourList, Vec2};
 
-/// Skin of the neighbour lists over the particle spacing: the lists survive displacements of half of it.
+/// Skin of the neighbour lists over the particle spacing: the lists stay valid for displacements of half of
+/// it.
 const SKIN: f64 = 0.3;
 
 /// Skin of a section's lists, m.
@@ -14,9 +15,10 @@ pub fn skin(model: &Model) -> f64 {
 /// Neighbours of the stress nodes and of the velocity nodes.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Lists {
-    /// Places of the nodes when the lists were built, m.
+    /// Positions of the nodes when the lists were built, m.
     reference: Vec<Vec2>,
-    /// Owners of the sources: a node may have entered an edge's reach since.
+    /// Owners of the sources when the lists were built: a node that moves towards an edge gets an image
+    /// later.
     owners: Vec<u32>,
     /// Nodes and images near every stress node.
     pub from_stress: NeighbourList,
@@ -45,18 +47,19 @@ impl Lists {
         }
     }
 
-    /// Whether the lists still hold: no node has left the skin, and the sources have the same owners.
-    pub fn hold(&self, model: &Model, around: &Surroundings, position: &[Vec2]) -> bool {
-        !self.are_left(model, position) && self.owners.iter().copied().eq(around.owners())
+    /// Whether the lists are still valid: no node has left the skin, and the sources have the same owners.
+    pub fn are_valid(&self, model: &Model, around: &Surroundings, position: &[Vec2]) -> bool {
+        !self.is_skin_left(model, position) && self.owners.iter().copied().eq(around.owners())
     }
 
-    /// Whether some node has left the skin.
-    pub fn are_left(&self, model: &Model, position: &[Vec2]) -> bool {
+    /// Whether a node has left the skin.
+    pub fn is_skin_left(&self, model: &Model, position: &[Vec2]) -> bool {
         let bound = 0.5 * skin(model);
         position.iter().zip(&self.reference).any(|(now, then)| (now - then).norm() > bound)
     }
 
-    /// Nodes listed near node `i`, itself among them, and how many periods to the right each stands; without images.
+    /// Nodes listed near node `i`, itself included, and the number of periods by which each is shifted to the
+    /// right; without images.
     pub fn nodes_near(&self, i: usize) -> impl Iterator<Item = (usize, f64)> {
         let nodes = self.reference.len();
         let near = self.from_velocity.of(i).iter();

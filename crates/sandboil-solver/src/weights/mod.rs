@@ -1,4 +1,5 @@
-//! Weights of the operators: neighbour lists, images beyond edges, rows of gradients, and their tables.
+//! Weights of the operators: neighbour lists, images beyond edges, rows of gradient weights, and their
+//! tables.
 
 pub mod balance;
 pub mod free_surface;

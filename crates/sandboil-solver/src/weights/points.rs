@@ -4,7 +4,7 @@ use crate::{
     section::{
         description::{Model, STRESS_NODES, stress_node_offset},
         node_id::id,
-        outline::{Outline, Walls},
+        outline::EdgesView,
     },
     weights::{images::Surroundings, stencils::Stencils},
 };
@@ -45,30 +45,30 @@ pub fn point_weights(model: &Model, position: &[Vec2], points: &[Vec2]) -> Csr<f
         let members = stencils.all(&list, k, at);
         let mut row: Vec<_> = match LeastSquaresFit::new(&members, kernel) {
             Ok(fit) => members.iter().enumerate().map(|(k, m)| (m.owner, fit.value_weight(k, m))).collect(),
-            // Beside too few nodes for a fit the nearest one speaks for the point.
-            Err(_) => nearest(position, at).into_iter().collect(),
+            // Too few nodes for a fit: use the nearest.
+            Err(_) => nearest_node(position, at).into_iter().collect(),
         };
         table.push_row(&mut row);
     }
     table
 }
 
-/// Value of the linear fit at every stress node, as weights of the nodes that sum to one. Beyond an edge that is held the
-/// ground goes on as it is: images there count for their nodes.
-pub fn stress_node_values(model: &Model, position: &[Vec2], (outline, walls): (&Outline, Walls)) -> Csr<f64> {
+/// Value of the linear fit at every stress node, as weights of the nodes that sum to one. Images continue the
+/// ground beyond a held edge: their weights are added to those of their nodes.
+pub fn stress_node_values(model: &Model, position: &[Vec2], edges: EdgesView) -> Csr<f64> {
     let kernel = WendlandQuintic::new(model.smoothing_length());
     let points = stress_node_positions(position, model.spacing);
-    let around = Surroundings::new(position, outline, walls, kernel.support());
+    let around = Surroundings::new(position, edges.outline, edges.walls, kernel.support());
     let list = NeighbourList::build(&points, &around.sources, kernel.support(), 0.0, model.period);
     let volume = vec![0.0; position.len()];
     let stencils = Stencils { around: &around, volume: &volume, kernel, period: model.period };
     let mut table = Csr::with_capacity(points.len(), list.pairs());
     for (s, &at) in points.iter().enumerate() {
         let members =
-            stencils.showing(&stencils.all(&list, s, at), |image| image.strain[0] && image.strain[1]);
+            stencils.including(&stencils.all(&list, s, at), |image| image.strain[0] && image.strain[1]);
         let mut row: Vec<_> = match LeastSquaresFit::new(&members, kernel) {
             Ok(fit) => members.iter().enumerate().map(|(k, m)| (m.owner, fit.value_weight(k, m))).collect(),
-            // A detached grain keeps its mass.
+            // A detached node keeps its mass.
             Err(_) => vec![(id(s / STRESS_NODES), 1.0)],
         };
         table.push_row(&mut row);
@@ -76,7 +76,8 @@ pub fn stress_node_values(model: &Model, position: &[Vec2], (outline, walls): (&
     table
 }
 
-pub fn nearest(position: &[Vec2], at: Vec2) -> Option<(u32, f64)> {
+/// The node nearest to a point, with the weight one; `None` without nodes.
+fn nearest_node(position: &[Vec2], at: Vec2) -> Option<(u32, f64)> {
     let distance = |x: &Vec2| (x - at).norm_squared();
     position
         .iter()

@@ -4,7 +4,7 @@ use crate::{
     section::{
         description::STRESS_NODES,
         node_id::id,
-        outline::{Condition, Outline, Walls},
+        outline::{Condition, EdgesView},
     },
     weights::{
         images::Surroundings,
@@ -25,15 +25,16 @@ pub struct PrintedTables {
     pub interpolation: Csr<f64>,
     /// `V_j grad_i W_ij` from velocity node to real stress nodes.
     pub kernel_gradient: Csr<Vec2>,
-    /// The same to the mirrored stress nodes beyond the edges; columns index `ghost_stress` rows.
+    /// The same to the mirrored stress nodes beyond the edges; columns are the rows of `ghost_stress`.
     pub ghost_gradient: Csr<Vec2>,
     /// Linear extrapolation of Eq. 11 from velocity nodes to mirrored stress nodes.
     pub ghost_stress: Csr<f64>,
-    /// Value at the mirror point, from velocity nodes: the odd shear of the compliant base.
+    /// Value at the mirror point, from velocity nodes: for the antisymmetric shear stress at the compliant
+    /// base.
     pub mirror_stress: Csr<f64>,
     /// Gradient of Eq. 9 at velocity nodes, for the pore pressure.
     pub pressure_gradient: Csr<Vec2>,
-    /// Whether a mirrored stress node lies below a base that carries no shear but the dashpots'.
+    /// Whether a mirrored stress node lies below a base whose only shear traction is that of the dashpots.
     pub odd_shear: Vec<bool>,
 }
 
@@ -43,7 +44,7 @@ pub fn printed_strain_tables(stencils: &Stencils, list: &NeighbourList, points: 
     let mut walls = Csr::with_capacity(points.len(), 0);
     for (s, &at) in points.iter().enumerate() {
         let members =
-            stencils.showing(&stencils.all(list, s, at), |image| image.strain[0] && image.strain[1]);
+            stencils.including(&stencils.all(list, s, at), |image| image.strain[0] && image.strain[1]);
         let (mut row, mut wall_row) = (Vec::new(), Vec::new());
         let corrected = corrected_gradient(&members, stencils.kernel);
         let fit = LeastSquaresFit::new(&members, stencils.kernel);
@@ -72,13 +73,13 @@ pub fn printed_tables(
     list: &Lists,
     points: &[Vec2],
     stress_points: &[Vec2],
-    (outline, walls): (&Outline, Walls),
+    edges: EdgesView,
 ) -> PrintedTables {
     let (kernel, period) = (velocity.kernel, velocity.period);
     // Eq. 6 and Eq. 10 gather from stress nodes, each with half its velocity node's volume.
     let stress_volume: Vec<f64> =
         velocity.volume.iter().flat_map(|v| [v / STRESS_NODES as f64; STRESS_NODES]).collect();
-    let around = Surroundings::new(stress_points, outline, walls, kernel.support());
+    let around = Surroundings::new(stress_points, edges.outline, edges.walls, kernel.support());
     let ghost_of = |source: u32| source - id(stress_points.len());
     let to_stress = NeighbourList::build(points, &around.sources, kernel.support(), 0.0, period);
     let stencils = Stencils { around: &around, volume: &stress_volume, kernel, period };
@@ -101,8 +102,8 @@ pub fn printed_tables(
         let weigh = |m: &Member| kernel.gradient(m.offset) * m.volume;
         let mut row: Vec<_> = real.iter().map(|m| (m.owner, weigh(m))).collect();
         tables.kernel_gradient.push_row(&mut row);
-        // Where an edge is left to tractions no stress goes on beyond it.
-        let shown = stencils.showing(&members, |image| image.strain[0] || image.strain[1]);
+        // No stress is continued beyond an edge under tractions.
+        let shown = stencils.including(&members, |image| image.strain[0] || image.strain[1]);
         let mut row: Vec<_> =
             shown.iter().filter(|m| m.mirrored).map(|m| (ghost_of(m.source), weigh(m))).collect();
         tables.ghost_gradient.push_row(&mut row);
@@ -126,7 +127,7 @@ pub fn printed_tables(
         tables.ghost_stress.push_row(&mut row);
         let mut row: Vec<_> = real.iter().zip(&fit).map(|(m, (value, _))| (m.owner, *value)).collect();
         tables.mirror_stress.push_row(&mut row);
-        tables.odd_shear.push(image.below && walls.base == Condition::FreeSlip);
+        tables.odd_shear.push(image.below && edges.walls.base == Condition::FreeSlip);
     }
     tables
 }

@@ -17,19 +17,20 @@ pub struct VectorWeight {
 }
 
 impl VectorWeight {
-    /// Each component by itself.
+    /// The same gradient weight for each component, without coupling.
     pub fn plain(gradient: Vec2) -> Self {
         Self { x: [gradient, Vec2::zeros()], y: [Vec2::zeros(), gradient] }
     }
 
-    /// One component by itself.
+    /// The weight in the gradient of one component only; `map` gives the velocity that has this gradient from
+    /// that of the node.
     pub fn of_component(component: usize, gradient: Vec2, map: Mat2) -> Self {
         let shown = [0, 1].map(|from| gradient * map[(component, from)]);
         let nothing = [Vec2::zeros(); 2];
         if component == 0 { Self { x: shown, y: nothing } } else { Self { x: nothing, y: shown } }
     }
 
-    /// Largest of its parts, 1/m.
+    /// Largest component, 1/m.
     pub fn magnitude(&self) -> f64 {
         self.x.iter().chain(&self.y).map(Vec2::amax).fold(0.0, f64::max)
     }
@@ -40,7 +41,8 @@ impl VectorWeight {
         (self.x[0] * v.x + self.x[1] * v.y, self.y[0] * v.x + self.y[1] * v.y)
     }
 
-    /// The force on the node of a nominal stress `[xx, xy, yx, yy]`: the transpose of the gradients, less the sign.
+    /// The force of a nominal stress `[xx, xy, yx, yy]` on the node, with the opposite sign: the transpose of
+    /// the gradients.
     #[inline]
     pub fn contract(&self, [xx, xy, yx, yy]: [f64; 4]) -> Vec2 {
         let (row_x, row_y) = (Vec2::new(xx, xy), Vec2::new(yx, yy));
@@ -53,31 +55,31 @@ impl VectorWeight {
 
 impl AddAssign for VectorWeight {
     fn add_assign(&mut self, other: Self) {
-        for (own, more) in self.x.iter_mut().chain(&mut self.y).zip(other.x.into_iter().chain(other.y)) {
-            *own += more;
+        for (sum, term) in self.x.iter_mut().chain(&mut self.y).zip(other.x.into_iter().chain(other.y)) {
+            *sum += term;
         }
     }
 }
 
 impl MulAssign<f64> for VectorWeight {
     fn mul_assign(&mut self, factor: f64) {
-        for own in self.x.iter_mut().chain(&mut self.y) {
-            *own *= factor;
+        for component in self.x.iter_mut().chain(&mut self.y) {
+            *component *= factor;
         }
     }
 }
 
-/// A table and its transpose: one gathers, the other gives the force back.
+/// A table and its transpose: the first gathers velocities, the second forces.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Paired<T> {
-    /// Rows gather.
+    /// Each row gathers from the columns.
     pub forward: Csr<T>,
-    /// Rows collect what their column took part in.
+    /// Its rows are the columns of `forward`.
     pub transposed: Csr<T>,
 }
 
 impl<T: Copy + AddAssign> Paired<T> {
-    /// A table with so many columns, and its transpose.
+    /// A table with a number of columns, and its transpose.
     pub fn new(forward: Csr<T>, columns: usize) -> Self {
         let transposed = forward.transposed(columns);
         Self { forward, transposed }
@@ -89,21 +91,23 @@ impl<T: Copy + AddAssign> Paired<T> {
     }
 }
 
+/// Gradient weights, position covariances (m2) and additional weights by images of all stress nodes.
 pub type StrainTables = (Csr<GradientWeight>, Vec<[f64; 3]>, Csr<VectorWeight>);
-/// Gradient weights at a stress node: those of the nodes around it by themselves, the covariance of their places,
-/// and what images change. Nothing for a detached grain (no plane neighbourhood): it strains no more and carries no
-/// force.
+
+/// Gradient weights at a stress node: those of the nodes around it without images, the covariance of their
+/// positions, and the changes by images. A node whose neighbours do not span the plane has no row: it is not
+/// strained and gets no force from stress.
 pub struct StrainRow {
     /// Node and its weight, without images.
     pub free: Vec<(u32, GradientWeight)>,
     /// Position covariance `(xx, xy, yy)`, m2.
     pub covariance: [f64; 3],
-    /// What images add for each node.
+    /// Additional weights of the nodes by images.
     pub walls: Vec<(u32, VectorWeight)>,
 }
 
 impl StrainRow {
-    /// Least-squares gradient. Each velocity component is fitted to the nodes and to the images that show it.
+    /// Least-squares gradient. Each velocity component is fitted to the nodes and to the images that have it.
     pub fn least_squares(stencils: &Stencils, members: &[Member]) -> Option<Self> {
         let real = real_only(members);
         let fit = LeastSquaresFit::new(&real, stencils.kernel).ok()?;
@@ -111,7 +115,7 @@ impl StrainRow {
         let c = fit.covariance();
         let mut walls = Vec::new();
         for component in [0, 1] {
-            let seen = stencils.showing(members, |image| image.strain[component]);
+            let seen = stencils.including(members, |image| image.strain[component]);
             if seen.len() == real.len() {
                 continue;
             }
@@ -142,12 +146,12 @@ pub fn least_squares_tables(stencils: &Stencils, list: &NeighbourList, points: &
     (gradient, covariance, walls)
 }
 
-/// Weights of the divergence at velocity node `own`, one component of the velocity after the other (last term of
-/// Eq. 7): each from the nodes and the images that show it.
+/// Weights of the divergence at velocity node `own` (last term of Eq. 7). Each velocity component is gathered
+/// from the nodes and from the images that have it.
 pub fn divergence_row(stencils: &Stencils, members: &[Member], own: u32) -> Vec<(u32, Vec2)> {
     let mut row = Vec::new();
     for component in [0, 1] {
-        let seen = stencils.showing(members, |image| image.flow[component]);
+        let seen = stencils.including(members, |image| image.flow[component]);
         let Ok(corrected) = corrected_gradient(&seen, stencils.kernel) else { continue };
         for (m, g) in seen.iter().zip(&corrected) {
             let map = stencils.map(m);

@@ -1,12 +1,12 @@
-//! Stencils of one query kind.
+//! Stencils around one kind of queries.
 
-use crate::weights::images::Surroundings;
+use crate::weights::images::{Image, Surroundings};
 use sandboil_sph::{
     Mat2, NeighbourList, Period, Vec2, WendlandQuintic,
     operators::{Member, stencil},
 };
 
-/// Stencils of one query kind, cut to the kernel's support.
+/// Stencils around one kind of queries, cut to the kernel's support.
 pub struct Stencils<'a> {
     pub around: &'a Surroundings,
     pub volume: &'a [f64],
@@ -20,21 +20,18 @@ impl Stencils<'_> {
         stencil(list, query, at, &self.around.sources, self.volume, self.kernel, self.period)
     }
 
-    /// Those of `members` that show the velocity component: the nodes, and images of which `shows` is true.
-    pub fn showing(
-        &self,
-        members: &[Member],
-        shows: impl Fn(&crate::weights::images::Image) -> bool,
-    ) -> Vec<Member> {
-        members.iter().copied().filter(|m| self.around.image(m.source).is_none_or(&shows)).collect()
+    /// The nodes among `members`, and the images for which `is_included` is true.
+    pub fn including(&self, members: &[Member], is_included: impl Fn(&Image) -> bool) -> Vec<Member> {
+        members.iter().copied().filter(|m| self.around.image(m.source).is_none_or(&is_included)).collect()
     }
 
-    /// Velocity of a member from that of its node.
+    /// Map from the velocity of a member's node to that of the member.
     pub fn map(&self, member: &Member) -> Mat2 {
         self.around.image(member.source).map_or_else(Mat2::identity, |image| image.map)
     }
 }
 
+/// The members that are nodes.
 pub fn real_only(members: &[Member]) -> Vec<Member> {
     members.iter().copied().filter(|m| !m.mirrored).collect()
 }
