@@ -30,7 +30,7 @@ impl UpgoingWave {
     }
 }
 
-/// Linear interpolation between samples, zero outside the record; `place` counts samples.
+/// Linear interpolation between samples, zero outside the record, at `place` in sampling intervals.
 pub fn interpolated(samples: &[f64], place: f64) -> f64 {
     if !(place >= 0.0) {
         return 0.0;
@@ -44,12 +44,12 @@ pub fn interpolated(samples: &[f64], place: f64) -> f64 {
     sample(before) * (1.0 - fraction) + sample(before + 1.0) * fraction
 }
 
-/// What the base does vertically while it is shaken.
+/// Vertical condition of a shaken base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Vertical {
-    /// Held, as the elements of a column are: compression waves come back.
+    /// Held: compression waves are reflected.
     Roller,
-    /// Held by the stored reaction alone: compression waves leave, and may come in.
+    /// Carried by the stored reaction only: compression waves leave, and may enter.
     Absorbing,
 }
 
@@ -58,7 +58,7 @@ pub enum Vertical {
 pub struct HalfSpace {
     /// Shear-wave speed, m/s.
     pub shear_speed: f64,
-    /// Compression-wave speed, m/s; needed where the base absorbs vertically or slopes.
+    /// Compression-wave speed, m/s; needed if the base is absorbing or inclined.
     pub compression_speed: Option<f64>,
     /// Density, Mg/m3.
     pub density: f64,
@@ -75,21 +75,21 @@ pub struct Impedance {
     pub compression_speed: f64,
 }
 
-/// Which wave comes to a stretch of the base, and when.
+/// The wave that arrives at a segment of the base, and when.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BaseSegment {
-    /// Its ends, m; what lies beyond the outermost ones belongs to them.
+    /// Left and right end, m; the outermost segments also apply beyond their outer ends.
     pub extent: [f64; 2],
-    /// Index of its wave; none: no motion.
+    /// Index of the wave; `None`: no motion.
     pub wave: Option<usize>,
-    /// When the wave's first sample reaches its left end, s.
+    /// Time at which the wave's first sample arrives at the left end, s.
     pub delay: f64,
-    /// How much later each metre further right is reached, s/m.
+    /// Additional delay per metre to the right, s/m.
     pub slowness: f64,
 }
 
 impl BaseSegment {
-    /// One wave for all of the base at once.
+    /// The same wave along the whole base, without delay.
     pub fn everywhere(wave: Option<usize>) -> Self {
         Self { extent: [f64::NEG_INFINITY, f64::INFINITY], wave, delay: 0.0, slowness: 0.0 }
     }
@@ -98,15 +98,15 @@ impl BaseSegment {
 /// The base of a shaking stage.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Base {
-    /// What it does vertically.
+    /// Vertical condition.
     pub vertical: Vertical,
-    /// The half-space, instead of the soil above the base.
+    /// The half-space; `None`: one with the properties of the soil above the base.
     pub half_space: Option<HalfSpace>,
-    /// The waves that its segments name.
+    /// The waves, to which the segments refer.
     pub waves: Vec<UpgoingWave>,
-    /// Its segments from left to right.
+    /// Segments from left to right.
     pub segments: Vec<BaseSegment>,
-    /// Elevation at which the waves' times hold, m; none: the lowest point of the base.
+    /// Elevation to which the arrival times of the waves refer, m; `None`: the lowest point of the base.
     pub datum: Option<f64>,
 }
 
@@ -128,17 +128,18 @@ impl Base {
         self.segments.len() > 1 || self.segments.iter().any(|s| s.slowness != 0.0 || s.delay != 0.0)
     }
 
-    /// What comes to the place `x`, as a segment for all of a base.
+    /// The wave that arrives at `x` and its delay, as a segment along the whole base.
     pub fn at(&self, x: f64) -> BaseSegment {
         let segment = self.segments.iter().find(|s| x <= s.extent[1]).or(self.segments.last());
         segment.map_or(BaseSegment::everywhere(None), |segment| {
-            let run = if segment.slowness == 0.0 { 0.0 } else { segment.slowness * (x - segment.extent[0]) };
-            BaseSegment { delay: segment.delay + run, ..BaseSegment::everywhere(segment.wave) }
+            let travel =
+                if segment.slowness == 0.0 { 0.0 } else { segment.slowness * (x - segment.extent[0]) };
+            BaseSegment { delay: segment.delay + travel, ..BaseSegment::everywhere(segment.wave) }
         })
     }
 }
 
-/// The compliant base of a set of operators, held vertically or not.
+/// Edge condition of the compliant base for a set of operators.
 pub fn base_condition(operators: Operators, absorbs_vertically: bool) -> Condition {
     match (operators, absorbs_vertically) {
         (_, true) => Condition::Traction,
@@ -162,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_segment_is_reached_at_its_delay_and_slowness() {
+    fn a_wave_arrives_with_the_delay_and_slowness_of_its_segment() {
         let segment = |from: f64, to: f64, delay: f64, slowness: f64| BaseSegment {
             extent: [from, to],
             wave: Some(0),
@@ -171,7 +172,7 @@ mod tests {
         };
         let segments = vec![segment(0.0, 10.0, 0.0, 0.01), segment(10.0, 20.0, 0.5, 0.0)];
         let base = Base { segments, ..Base::shaken_by(Some(UpgoingWave::default())) };
-        let late = |x: f64| base.at(x).delay;
-        assert_eq!([0.0, 5.0, 10.0, 11.0, 25.0].map(late), [0.0, 0.05, 0.1, 0.5, 0.5]);
+        let delay = |x: f64| base.at(x).delay;
+        assert_eq!([0.0, 5.0, 10.0, 11.0, 25.0].map(delay), [0.0, 0.05, 0.1, 0.5, 0.5]);
     }
 }

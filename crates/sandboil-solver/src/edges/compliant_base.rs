@@ -9,22 +9,22 @@ use crate::{
 };
 use sandboil_sph::{Csr, Vec2};
 
-/// What comes in at one dashpot of the base: velocities of the half-space's waves, weighted.
+/// The wave that arrives at one dashpot of the base.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub struct Incoming {
     wave: usize,
     /// Delay of the shear and of the compression wave, s.
     delay: [f64; 2],
-    /// Pull for a unit of the upgoing horizontal and vertical velocity.
+    /// Target velocity of the dashpot for a unit of the upgoing horizontal and vertical velocity.
     factor: Vec2,
 }
 
 /// The compliant base: dashpots that pull towards the motion of the half-space.
 ///
-/// On a half-space with the upgoing waves `v_su`, `v_pu` a dashpot's traction is `sigma_up . n + eta (v_up - v)`, with
-/// the stress `sigma_up` of the waves. On a level base this is Eq. 14, `2 rho C_s v_su - eta_s v_x` and the same for P;
-/// the waves rise with level fronts, so on an inclined base their stress turns with the normal and they are late by the
-/// height over the datum.
+/// On a half-space with the upgoing waves `v_su`, `v_pu` a dashpot's traction is `sigma_up . n + eta (v_up -
+/// v)`, with the stress `sigma_up` of the waves. On a level base this is Eq. 14, `2 rho C_s v_su - eta_s v_x`
+/// and the same for P. The waves rise with level fronts: on an inclined base their traction depends on the
+/// normal, and they arrive later at points above the datum.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct CompliantBase {
     dashpots: Dashpots,
@@ -51,13 +51,14 @@ impl CompliantBase {
             let (eta_s, eta_p) = (density * shear_speed, density * compression_speed);
             let normal = model.outline.base_normal(at.x);
             let tangent = Vec2::new(-normal.y, normal.x);
-            // What resists a horizontal motion of an inclined roller base: its components along and across.
+            // Resistance to a horizontal motion of an inclined roller base: from its components along and
+            // across the base.
             let horizontal = (Vec2::x(), eta_s * tangent.x.powi(2) + eta_p * normal.x.powi(2));
             let directions = match base.vertical {
                 Vertical::Roller => vec![horizontal],
                 Vertical::Absorbing => vec![(tangent, eta_s), (normal, eta_p)],
             };
-            // Stress of upgoing waves of unit velocity on the base.
+            // Tractions of upgoing waves of unit velocity on the base.
             let lateral = eta_p - 2.0 * eta_s * shear_speed / compression_speed;
             let shear_wave = -eta_s * Vec2::new(normal.y, normal.x);
             let compression_wave = -Vec2::new(lateral * normal.x, eta_p * normal.y);

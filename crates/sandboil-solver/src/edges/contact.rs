@@ -1,5 +1,5 @@
-//! Contact of single nodes with edges. A node without neighbours has no strain, and so no stress that would stop it at an
-//! edge: it sticks there.
+//! Contact of single nodes with edges. A node without neighbours has no strain, and so no stress that would
+//! stop it at an edge: it is stopped there.
 
 use crate::edges::dashpots::NodalMotion;
 use crate::section::{
@@ -8,10 +8,10 @@ use crate::section::{
 };
 use sandboil_sph::Vec2;
 
-/// Least distance of a node from an edge, in spacings: a bed of nodes has half of one.
+/// Least distance of a node from an edge, in spacings; that of the lowest row of a layer is 0.5.
 pub const LEAST_DISTANCE: f64 = 0.2;
-/// Stops nodes that would come too near an edge in the step. Returns how many.
-pub fn stick_to_edges(
+/// Stops nodes that would come too near to an edge in the step. Returns how many were stopped.
+pub fn stop_near_edges(
     model: &Model,
     outline: &Outline,
     position: &[Vec2],
@@ -50,15 +50,16 @@ mod tests {
     use super::*;
     use crate::{section::outline::Support, testing::square_block};
 
-    /// A grain that flies to the base or to a wall stops before it; one that leaves goes on.
+    /// A single node that moves towards the base or a wall stops in front of it; one that moves away
+    /// continues.
     #[test]
-    fn grains_stick_to_edges() {
+    fn single_nodes_stop_at_edges() {
         let mut model = square_block(1);
         model.outline = Outline::level(0.0);
         model.outline.sides[1] = Some(Side { x: 5.0, extent: [0.0, 3.0], support: Support::FreeSlip });
         let stopped = |at: Vec2, velocity: Vec2| {
             let (mut v, mut a) = ([velocity], [Vec2::zeros()]);
-            let count = stick_to_edges(
+            let count = stop_near_edges(
                 &model,
                 &model.outline,
                 &[at],

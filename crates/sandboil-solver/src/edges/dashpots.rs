@@ -1,5 +1,5 @@
-//! Dashpots on the trace of the velocity field: at the compliant base (Eq. 14 as corrected) and at free-field sides (Eq. 15
-//! as corrected).
+//! Dashpots on the velocity field along an edge: at the compliant base (Eq. 14 as corrected) and at
+//! free-field sides (Eq. 15 as corrected).
 
 use crate::{
     section::description::{Model, Operators},
@@ -7,10 +7,11 @@ use crate::{
 };
 use sandboil_sph::{Csr, Vec2};
 
-/// Means over a step of `exp(-z t)` and of what a constant push moves meanwhile, `(1 - exp(-z t)) / z`, with `t` in
-/// steps and `z` the decay of a step: what the dashpot feels of the velocity before and of the step's other forces.
+/// Means over a step of `exp(-z t)` and of `(1 - exp(-z t)) / z`, with `t` in steps and `z` the decay rate
+/// per step. They weight the velocity before the step, and the velocity change by the other forces of the
+/// step, in the mean velocity of a dashpot.
 pub fn relaxation(z: f64) -> (f64, f64) {
-    // Below, the second mean is lost to cancellation, and its limit is closer than that.
+    // Below this the second mean is lost to cancellation; its limit is more accurate.
     const NEGLIGIBLE: f64 = 1e-7;
     if z < NEGLIGIBLE {
         return (1.0, 0.5);
@@ -19,7 +20,8 @@ pub fn relaxation(z: f64) -> (f64, f64) {
     (relaxed, (1.0 - relaxed) / z)
 }
 
-/// Velocities and accelerations of a section's nodes, followed by the copies of a neighbour's. Forces change both alike.
+/// Velocities and accelerations of a section's nodes, followed by the copies of a neighbour's. A force
+/// changes both.
 pub struct NodalMotion<'a> {
     /// Velocities, m/s.
     pub velocity: &'a mut [Vec2],
@@ -41,11 +43,11 @@ impl NodalMotion<'_> {
 pub struct Dashpot {
     /// Index of its point.
     pub point: usize,
-    /// Unit vector of the velocity it feels.
+    /// Unit vector of the velocity component that it resists.
     pub direction: Vec2,
     /// `rho_m C`, kPa s/m.
     pub impedance: f64,
-    /// Length of edge it stands for, m.
+    /// Length of edge that it represents, m.
     pub length: f64,
 }
 
@@ -55,18 +57,18 @@ pub struct Dashpots {
     all: Vec<Dashpot>,
     /// Weights of the velocity on the edge: rows are points, columns velocity nodes.
     trace: Csr<f64>,
-    /// `sum_j N_ij sum_k N_kj A_k eta_k / m_j`: what a unit of the trace velocity loses in a second, 1/s.
+    /// `sum_j N_ij sum_k N_kj A_k eta_k / m_j`: decay rate of the velocity at each dashpot, 1/s.
     rate: Vec<f64>,
     before: Vec<f64>,
     traction: Vec<f64>,
-    /// What a unit force of each dashpot adds to accelerations beside those of the trace, 1/Mg, if anything.
+    /// Accelerations by a unit force of each dashpot in addition to those by the trace, 1/Mg.
     spread: Option<Csr<Vec2>>,
 }
 
 impl Dashpots {
-    /// Dashpots on points whose velocity `trace` reads.
+    /// Dashpots at points whose velocities `trace` gives.
     pub fn new(all: Vec<Dashpot>, trace: Csr<f64>, mass: &[f64]) -> Self {
-        // A unit velocity in the dashpot's direction is resisted by every dashpot, each as far as it looks that way.
+        // Every dashpot resists the component of a unit velocity in its own direction.
         let transposed = trace.transposed(mass.len());
         let mut at_point: Vec<Vec<&Dashpot>> = vec![Vec::new(); trace.rows()];
         for dashpot in &all {
@@ -74,8 +76,8 @@ impl Dashpots {
         }
         let drag = |node: usize, direction: Vec2| -> f64 {
             let at = |(point, weight): (usize, &f64)| -> f64 {
-                let felt = |d: &&Dashpot| d.length * d.impedance * d.direction.dot(&direction).powi(2);
-                weight * at_point[point].iter().map(felt).sum::<f64>()
+                let resistance = |d: &&Dashpot| d.length * d.impedance * d.direction.dot(&direction).powi(2);
+                weight * at_point[point].iter().map(resistance).sum::<f64>()
             };
             transposed.iter_row(node).map(at).sum()
         };
@@ -100,14 +102,15 @@ impl Dashpots {
         &self.trace
     }
 
-    /// Lets a unit force of each dashpot give `nodes` nodes these accelerations (1/Mg) beside those of the trace.
+    /// Adds the accelerations (1/Mg) that a unit force of each dashpot gives to the `nodes` nodes in addition
+    /// to those by the trace.
     pub fn spread_by(&mut self, spread: Csr<Vec2>, nodes: usize) {
         let transposed = spread.transposed(nodes);
         for (rate, Dashpot { point, direction, .. }) in self.rate.iter_mut().zip(&self.all) {
             let lost = |(k, response): (usize, &Vec2)| {
                 let resisting = &self.all[k];
-                let felt = resisting.length * resisting.impedance * resisting.direction.dot(direction);
-                response.dot(direction) * felt
+                let resistance = resisting.length * resisting.impedance * resisting.direction.dot(direction);
+                response.dot(direction) * resistance
             };
             let along = |(node, weight): (usize, &f64)| -> f64 {
                 weight * transposed.iter_row(node).map(lost).sum::<f64>()
@@ -122,23 +125,25 @@ impl Dashpots {
         &self.traction
     }
 
-    fn felt(&self, dashpot: &Dashpot, velocity: &[Vec2]) -> f64 {
+    /// Velocity at a dashpot in its direction, m/s.
+    fn velocity_at(&self, dashpot: &Dashpot, velocity: &[Vec2]) -> f64 {
         let along = |(node, weight): (usize, &f64)| weight * velocity[node].dot(&dashpot.direction);
         self.trace.iter_row(dashpot.point).map(along).sum()
     }
 
-    /// Remembers the trace before the step's forces act.
+    /// Stores the velocities at the dashpots before the step's forces act.
     pub fn begin_step(&mut self, velocity: &[Vec2]) {
         for k in 0..self.all.len() {
-            self.before[k] = self.felt(&self.all[k], velocity);
+            self.before[k] = self.velocity_at(&self.all[k], velocity);
         }
     }
 
-    /// Adds the tractions to velocities that all other forces of the step have moved already. `target` is the velocity
-    /// (m/s) in its direction towards which each dashpot pulls.
+    /// Adds the tractions to velocities that all other forces of the step have already changed. `target` is
+    /// the velocity (m/s) towards which each dashpot pulls, in its direction.
     ///
-    /// Over a step of constant other forces the pull is solved exactly, so a dashpot of any strength neither limits the
-    /// time step nor overshoots. The coupling between neighbouring points is lumped, exact for uniform motion.
+    /// The solution is exact if the other forces are constant over the step, so a dashpot of any strength
+    /// neither limits the time step nor overshoots. The coupling between neighbouring points is lumped, which
+    /// is exact for uniform motion.
     pub fn end_step(
         &mut self,
         dt: f64,
@@ -148,7 +153,7 @@ impl Dashpots {
     ) {
         // All points read the velocities before any is changed.
         for (k, dashpot) in self.all.iter().enumerate() {
-            let (before, moved) = (self.before[k], self.felt(dashpot, motion.velocity));
+            let (before, moved) = (self.before[k], self.velocity_at(dashpot, motion.velocity));
             let (relaxed, pushed) = relaxation(self.rate[k] * dt);
             self.traction[k] =
                 dashpot.impedance * (relaxed * (target(k) - before) - pushed * (moved - before));
@@ -164,12 +169,12 @@ impl Dashpots {
         }
     }
 
-    /// Work of the last step's tractions on velocities that have had all their forces, kJ/m.
+    /// Work of the last step's tractions, kJ/m, from velocities that include all forces of the step.
     pub fn work(&self, dt: f64, velocity: &[Vec2]) -> f64 {
         let dashpots = self.all.iter().zip(&self.traction).zip(&self.before);
         dashpots
             .map(|((dashpot, traction), before)| {
-                traction * dashpot.length * 0.5 * (before + self.felt(dashpot, velocity)) * dt
+                traction * dashpot.length * 0.5 * (before + self.velocity_at(dashpot, velocity)) * dt
             })
             .sum()
     }
@@ -181,7 +186,8 @@ impl Dashpots {
     }
 }
 
-/// Trace of the velocity field at points of an edge. The printed set reads the outermost node itself (Section 4.2).
+/// Weights of the velocity field at points of an edge. The printed operators use the outermost node itself
+/// (Section 4.2).
 pub fn trace(model: &Model, position: &[Vec2], points: &[Vec2], nodes: &[usize]) -> Csr<f64> {
     match model.numerics.operators {
         Operators::Conservative => point_weights(model, position, points),
@@ -204,7 +210,7 @@ mod tests {
         assert_eq!(relaxation(0.0), (1.0, 0.5));
         for z in [1e-7, 1e-5, 1e-3, 0.1, 1.0, 10.0, 1e6] {
             let (relaxed, pushed) = relaxation(z);
-            // The decay over the step, and that its integral gives the second mean.
+            // The decay over the step, and the second mean as its integral.
             assert!((1.0 - z * relaxed - (-z).exp()).abs() < 1e-14 * z.max(1.0), "{z}");
             let exact: f64 =
                 (0..1000).map(|k| -(-z * (f64::from(k) + 0.5) / 1000.0).exp_m1() / z / 1000.0).sum();

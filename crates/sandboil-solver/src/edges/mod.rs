@@ -1,4 +1,4 @@
-//! Edges of a section in motion: dashpots, compliant base, contact.
+//! Edges of a moving section: dashpots, compliant base, contact of single nodes.
 
 pub mod base;
 pub mod compliant_base;
