@@ -1,12 +1,13 @@
-//! Sharp contacts of soils of different stiffness, beside dispersion-corrected inertia.
+//! Sharp contacts between soils of different stiffness, for dispersion-corrected inertia.
 //!
-//! The fitted gradient is smooth: across a contact it cannot take the jump of strain that equal traction asks for, and
-//! the contact is too stiff. Let `psi` be the ramp that is zero below the contact and its height above it, and `c_s =
-//! grad psi - sum_j g_sj psi_j` what the fit at stress node `s` misses of its kink. The velocity gradient gets
-//! `kappa (x) c_s` more, with the vector `kappa` that asks for the least elastic energy,
-//! `sum_s V_s sigma_s(v, kappa) c_s = 0`: equal tractions on both sides in the mean (enhanced assumed strain, Simo and
-//! Rifai 1990). `kappa` is linear in the velocities, so this is another gradient, and force stays its transpose.
-//! `sum_s V_s c_s = 0`: uniform stress is in equilibrium as before. Rigid motion has no stress and hence no `kappa`.
+//! The fitted gradient is smooth: it cannot jump across a contact, as equal tractions require, and the
+//! contact is too stiff. Let `psi` be a ramp: zero below the contact and the height above it. Let `c_s = grad
+//! psi - sum_j g_sj psi_j` be the part of its gradient that the fit at stress node `s` misses. The term
+//! `kappa (x) c_s` is added to the velocity gradient, with the vector `kappa` of least elastic energy, `sum_s
+//! V_s sigma_s(v, kappa) c_s = 0`: the mean tractions on both sides are equal (enhanced assumed strain, Simo
+//! and Rifai 1990). `kappa` is linear in the velocities, so this is another gradient, and force stays its
+//! transpose. `sum_s V_s c_s = 0`: uniform stress stays in equilibrium. Rigid motion causes no stress and
+//! hence no `kappa`.
 
 use crate::{
     section::{
@@ -19,26 +20,27 @@ use crate::{
 use sandboil_sph::{Csr, Mat2, Period, Vec2, WendlandQuintic};
 use std::collections::BTreeMap;
 
-/// Ratio of stiffness from which two soils have a contact. Below, its error is less than one part in a hundred of a
-/// spacing.
+/// Least ratio of stiffness at which two soils have a contact. Below it the error is less than a hundredth of
+/// a spacing.
 const LEAST_CONTRAST: f64 = 1.05;
-/// What a count of rows may miss by rounding.
+/// Rounding tolerance of a count of rows.
 const ROUNDING: f64 = 1e-9;
-/// How much higher or lower, in spacings, the contact of the next column may lie and still be the same: 45 degrees.
+/// Largest difference in height, in spacings, between neighbouring columns along the same contact: 45
+/// degrees.
 const STEEPEST: f64 = 1.5;
-/// Columns on either side whose contact says how a contact lies.
+/// Columns on each side from which the slope of a contact is fitted.
 const COLUMNS_AROUND: usize = 3;
 /// Elastic moduli of a stress node, kPa.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Stiffness {
     /// Shear modulus.
     shear: f64,
-    /// In confined compression, pore water included: it does not drain within a wave.
+    /// Modulus in confined compression, with the pore water: it does not drain within a wave.
     confined: f64,
 }
 
 impl Stiffness {
-    /// Traction on the vector `c` of the stress that a gradient with rows `x`, `y` gives.
+    /// Traction on the vector `c` by the stress of a gradient with rows `x`, `y`.
     fn traction(self, (x, y): (Vec2, Vec2), c: Vec2) -> Vec2 {
         let volumetric = (self.confined - 2.0 * self.shear) * (x.x + y.y);
         let shear = self.shear * (x.y + y.x);
@@ -58,8 +60,8 @@ struct Contact {
     points: Vec<(usize, bool)>,
 }
 
-/// The contacts of a section, each with the stiffness around it when shaking began. Soil that softens afterwards takes
-/// no more energy than it would without `kappa`, so that no wave becomes faster.
+/// The contacts of a section, with the stiffness when shaking began. Soil that softens later takes no more
+/// energy than without `kappa`, so no wave becomes faster.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Contacts {
     stiffness: Vec<Stiffness>,
@@ -67,7 +69,7 @@ pub struct Contacts {
 }
 
 impl Contacts {
-    /// Finds them on the undeformed lattice, one in every column between nodes one above the other.
+    /// Finds the contacts on the undeformed lattice, in every column between two nodes one above the other.
     pub fn new(model: &Model, points: &[StressPoint]) -> Self {
         let stiffness: Vec<Stiffness> = points
             .iter()
@@ -103,18 +105,19 @@ impl Contacts {
         Self { stiffness, all }
     }
 
-    /// Gives the strain its kinks at the contacts, and adds what they change of the nodes' masses (Mg/m) to `mass`.
-    /// `value` holds the fit's value at the stress nodes.
+    /// Adds the kinks at the contacts to the gradients of `geometry`, and the changes of the nodes' masses
+    /// (Mg/m) to `mass`. `value` holds the weights of the fit's value at the stress nodes.
     pub fn sharpen(
         &self,
         model: &Model,
         position: &[Vec2],
         points: &[StressPoint],
         value: &Csr<f64>,
-        (geometry, mass): (&mut Geometry, &mut [f64]),
+        geometry: &mut Geometry,
+        mass: &mut [f64],
     ) {
         let stress_position = stress_node_positions(position, model.spacing);
-        let mut more: BTreeMap<usize, Vec<(u32, VectorWeight)>> = BTreeMap::new();
+        let mut kinked: BTreeMap<usize, Vec<(u32, VectorWeight)>> = BTreeMap::new();
         for contact in &self.all {
             let plane = self.plane(model, position, contact);
             let kinks: Vec<Kink> = contact
@@ -141,17 +144,18 @@ impl Contacts {
                 mass[j] += inertia * along.dot(&(kappa * along));
             }
             for Kink { point, missed, .. } in &kinks {
-                let row = more.entry(*point).or_default();
+                let row = kinked.entry(*point).or_default();
                 row.extend(response.iter().map(|(&j, kappa)| {
                     let part = |of: usize, from: usize| missed * kappa[(of, from)];
                     (id(j), VectorWeight { x: [part(0, 0), part(0, 1)], y: [part(1, 0), part(1, 1)] })
                 }));
             }
         }
-        geometry.enhance(more, position.len());
+        geometry.enhance(kinked, position.len());
     }
 
-    /// The contact's plane around a column: the line through the contact of the columns around, whose steps it evens out.
+    /// The contact's plane at a column: a line fitted to the contact in the columns around, which smooths the
+    /// steps of the lattice.
     fn plane(&self, model: &Model, position: &[Vec2], contact: &Contact) -> Plane {
         let place = |contact: &Contact| 0.5 * (position[contact.above] + position[contact.below]);
         let origin = place(contact);
@@ -174,7 +178,8 @@ impl Contacts {
         Plane { origin: origin + Vec2::y() * (y - slope * x), slope, period: model.period }
     }
 
-    /// `kappa` of the velocity of every node that the strains around a contact see; none without stiffness.
+    /// `kappa` per unit velocity of every node that takes part in the strains around a contact; `None`
+    /// without stiffness.
     fn response(
         &self,
         geometry: &Geometry,
@@ -214,7 +219,7 @@ impl Contacts {
     }
 }
 
-/// What the fit at a stress node misses of the ramp's gradient.
+/// The part of the ramp's gradient that the fit at a stress node misses.
 #[derive(Debug, Clone, Copy)]
 struct Kink {
     point: usize,
@@ -222,7 +227,8 @@ struct Kink {
     missed: Vec2,
 }
 
-/// Uniform stress on the kinks of a contact must do no work: exact on a level contact, made so on others.
+/// Makes the mean kink of a contact zero, so that uniform stress does no work on the kinks. On a level
+/// contact it is zero already.
 fn balanced(mut kinks: Vec<Kink>, points: &[StressPoint]) -> Vec<Kink> {
     let volume = |kink: &Kink| points[kink.point].volume;
     let total: f64 = kinks.iter().map(volume).sum();
@@ -234,7 +240,7 @@ fn balanced(mut kinks: Vec<Kink>, points: &[StressPoint]) -> Vec<Kink> {
     kinks
 }
 
-/// A contact seen from near.
+/// The plane of a contact at a column.
 #[derive(Debug, Clone, Copy)]
 struct Plane {
     origin: Vec2,
@@ -243,7 +249,7 @@ struct Plane {
 }
 
 impl Plane {
-    /// Height of `at`, or of its image next to `seen_from`, over the plane, m.
+    /// Height over the plane, m, of `at` or of its periodic image next to `seen_from`.
     fn height(&self, at: Vec2, seen_from: Vec2) -> f64 {
         let beside = |x: f64| {
             self.period.map_or(x, |Period { width }| x - width * ((x - seen_from.x) / width).round())
@@ -291,8 +297,8 @@ fn columns(model: &Model) -> BTreeMap<i64, Vec<usize>> {
     columns
 }
 
-/// Contacts of a column's nodes, from below: those of layers that are at least as thick as the kernel reaches. The fits of
-/// thinner ones see across both of their sides, and their masses would not all be positive.
+/// Contacts in a column, from below, between layers at least as thick as the reach of the kernel. Fits in
+/// thinner layers reach across both contacts, and some masses would be negative.
 fn contacts_of(model: &Model, column: &[usize], stiffness: &[Stiffness]) -> Vec<Contact> {
     let reach = WendlandQuintic::new(model.smoothing_length()).support();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few rows
@@ -305,7 +311,7 @@ fn contacts_of(model: &Model, column: &[usize], stiffness: &[Stiffness]) -> Vec<
         model.region[column[row]] != model.region[column[row - 1]]
             && (apart(a.shear, b.shear) || apart(a.confined, b.confined))
     };
-    // First rows of layers, the end of the column included.
+    // First rows of the layers, and the end of the column.
     let mut layers: Vec<usize> = (1..column.len()).filter(|&row| !adjacent(row) || differ(row)).collect();
     layers.insert(0, 0);
     layers.push(column.len());
@@ -343,7 +349,7 @@ mod tests {
     use crate::{
         section::{
             description::Water,
-            outline::{Condition, Outline, Walls},
+            outline::{Condition, EdgesView, Outline, Walls},
         },
         skeleton::{
             inertia::tests::{Block, layered},
@@ -368,8 +374,9 @@ mod tests {
         inside(x.x) && inside(x.y)
     }
 
-    /// A motion that is linear on either side, rotation included, with equal tractions across a contact is strained
-    /// exactly in shear. A jump of the lateral stress is felt a little by fits off the lattice's centres.
+    /// Strain is exact for a motion that is linear on each side of a contact, rotation included, with equal
+    /// tractions. A jump of the lateral stress causes a small error, because stress nodes are off the
+    /// lattice's centres.
     #[test]
     fn a_motion_with_a_kink_is_exact() {
         let [below, above] = MODULI.map(|[shear, confined]| Stiffness { shear, confined });
@@ -403,7 +410,7 @@ mod tests {
         }
     }
 
-    /// Uniform stress is in equilibrium at contacts of any slope, and so is what is at rest without sharp contacts.
+    /// Uniform stress is in equilibrium at contacts of any slope.
     #[test]
     fn uniform_stress_is_in_equilibrium() {
         for slope in [0.0, 0.3, -0.7, 1.0] {
@@ -431,10 +438,11 @@ mod tests {
         }
     }
 
-    /// A motion with a kink at an inclined contact, of which the lattice has steps: its energy around the contact is within 1 %
-    /// of the exact one (smooth strain is off by 3 % at most of these slopes).
+    /// The energy of a motion with a kink at an inclined contact, which has steps on the lattice, is within
+    /// 1 % of the exact value around the contact. Without sharp contacts the error is 3 % for most of these
+    /// slopes.
     #[test]
-    fn an_inclined_contact_has_its_energy() {
+    fn energy_at_an_inclined_contact_is_correct() {
         let soils = MODULI.map(|[shear, confined]| Stiffness { shear, confined });
         let (x, y) = (Vec2::new(0.3, -0.5), Vec2::new(0.8, -0.4));
         for slope in [0.05, 0.1, 0.2, 0.33, 0.5, 0.8] {
@@ -470,14 +478,14 @@ mod tests {
                     found += energy(motion(&block.geometry, s, &velocity).gradient());
                 }
             }
-            println!("slope {slope}: energy off by {:+.2} %", 100.0 * (found / exact - 1.0));
+            println!("slope {slope}: error of the energy {:+.2} %", 100.0 * (found / exact - 1.0));
             assert!((found / exact - 1.0).abs() < 0.01, "{slope}: {found} {exact}");
         }
     }
 
-    /// The kinks have the least energy, images beyond a base included: sharpening once more changes nothing.
+    /// The kinks have the least energy, with images beyond a base: sharpening again changes nothing.
     #[test]
-    fn what_is_sharp_stays_as_it_is() {
+    fn sharpening_twice_changes_nothing() {
         let mut model = layered(square_block(SIDE), SIDE - 3);
         model.outline = Outline::level(-0.5);
         let walls = Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]);
@@ -488,18 +496,18 @@ mod tests {
             (0..block.points.len()).map(|s| motion(&block.geometry, s, &velocity).gradient()).collect()
         };
         let once = strained(&block);
-        let value = stress_node_values(&model, &model.position, (&model.outline, walls));
+        let value = stress_node_values(&model, &model.position, EdgesView { outline: &model.outline, walls });
         let contacts = Contacts::new(&model, &block.points);
-        let changed = (&mut block.geometry, block.mass.as_mut_slice());
-        contacts.sharpen(&model, &model.position, &block.points, &value, changed);
+        let Block { geometry, points, mass, .. } = &mut block;
+        contacts.sharpen(&model, &model.position, points, &value, geometry, mass);
         for (once, twice) in once.iter().zip(strained(&block)) {
             assert!((once.0 - twice.0).norm() + (once.1 - twice.1).norm() < 1e-12, "{once:?} {twice:?}");
         }
     }
 
-    /// Pore water that does not drain compresses both sides alike, whatever their skeletons; shear keeps its kink.
+    /// With undrained pore water compression is the same on both sides of a contact; shear keeps its kink.
     #[test]
-    fn pore_water_evens_compression() {
+    fn pore_water_makes_compression_uniform() {
         let mut model = layered(square_block(SIDE), SIDE / 2);
         model.water = Some(Water { unit_weight: 10.0, bulk_modulus: 1e6 });
         model.pore_pressure = vec![0.0; model.nodes()];
@@ -516,7 +524,7 @@ mod tests {
         assert!(most[0] < 1e-4 && most[1] > 0.1, "{most:?}");
     }
 
-    /// Nothing changes between soils of nearly one stiffness, nor at layers thinner than the kernel's reach.
+    /// Nothing changes between soils of nearly equal stiffness, or at layers thinner than the kernel's reach.
     #[test]
     fn only_contacts_that_are_resolved_are_sharp() {
         let entries = |rows: usize, shear: f64| {

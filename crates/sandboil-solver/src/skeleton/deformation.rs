@@ -1,10 +1,10 @@
-//! Deformation since the geometry was built: the total-Lagrangian form, which needs no new weights while strains
-//! are moderate and leaves a strained lattice as consistent as the one it came from.
+//! Deformation since the geometry was built. This total-Lagrangian form needs no new weights while strains
+//! are moderate, and on a strained lattice it is as consistent as on the lattice before.
 
 use sandboil_soil::Stress;
 use sandboil_sph::Vec2;
 
-/// Deformation gradient `F = dx/dX` in the plane, rows in space, columns in the geometry's own frame.
+/// Deformation gradient `F = dx/dX` in the plane, rows in space, columns in the geometry's frame.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Deformation {
     /// `dx/dX`.
@@ -23,11 +23,11 @@ impl Default for Deformation {
     }
 }
 
-/// `J F^-T`: carries areas of the geometry's frame into space. Rows in space.
+/// `J F^-T`: maps areas from the geometry's frame to space. Rows in space.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Cofactor([f64; 4]);
 impl Deformation {
-    /// Volume over that when the geometry was built.
+    /// Present volume over that when the geometry was built.
     #[inline]
     pub fn volume_ratio(&self) -> f64 {
         self.xx * self.yy - self.xy * self.yx
@@ -39,7 +39,7 @@ impl Deformation {
         Cofactor([self.yy, -self.yx, -self.xy, self.xx])
     }
 
-    /// Largest departure of a component from no deformation.
+    /// Largest difference of a component from that without deformation.
     pub fn magnitude(&self) -> f64 {
         (self.xx - 1.0).abs().max((self.yy - 1.0).abs()).max(self.xy.abs()).max(self.yx.abs())
     }
@@ -55,7 +55,7 @@ impl Deformation {
         }
     }
 
-    /// Adds a gradient of displacement given by its rows, 1.
+    /// Adds a displacement gradient, given by its dimensionless rows.
     #[inline]
     pub fn moved(&self, x: Vec2, y: Vec2) -> Self {
         Self { xx: self.xx + x.x, xy: self.xy + x.y, yx: self.yx + y.x, yy: self.yy + y.y }
@@ -109,7 +109,7 @@ mod tests {
 
     #[test]
     fn in_space_inverts_the_deformation() {
-        // A field linear in space, f = 2 x - 3 y, seen from the geometry's frame.
+        // The gradient of the field f = 2 x - 3 y in the geometry's frame.
         let in_frame = Vec2::new(2.0 * SHEARED.xx - 3.0 * SHEARED.yx, 2.0 * SHEARED.xy - 3.0 * SHEARED.yy);
         assert!((SHEARED.in_space(in_frame) - Vec2::new(2.0, -3.0)).norm() < 1e-14);
     }

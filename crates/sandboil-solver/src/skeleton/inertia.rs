@@ -1,11 +1,12 @@
-//! Dispersion-corrected inertia: short waves at the speed of long ones, to fourth order in wave number.
+//! Dispersion-corrected inertia: short waves are as fast as long ones, to fourth order in the wave number.
 //!
-//! The least-squares gradient `g` of a wave `k` is too weak, `|g|^2 = k^2 (1 - b k^2)`, and with it the stiffness. Let
-//! `D = M^-1 K_1` be the operator of an elastic skeleton in which waves of both kinds have unit speed, made of the same
-//! gradient and its transpose. With the acceleration `(1 + b D) M^-1 F` squared frequencies are `c^2 |g|^2 (1 + b |g|^2)
-//! = c^2 k^2 (1 + O(k^4))`. `D` is symmetric to the masses, positive, and zero on rigid motion: the inertia
-//! `M (1 + b D)^-1` is symmetric and positive, so energy stays bounded whatever the soil does, and no force gains or
-//! loses linear or angular momentum.
+//! The least-squares gradient `g` of a wave `k` is too small, `|g|^2 = k^2 (1 - b k^2)`, and so is the
+//! stiffness. Let `D = M^-1 K_1` be the operator of an elastic skeleton whose shear and compression waves
+//! have unit speed, made of the same gradient and its transpose. With the acceleration `(1 + b D) M^-1 F`
+//! squared frequencies are `c^2 |g|^2 (1 + b |g|^2) = c^2 k^2 (1 + O(k^4))`. `D` is symmetric with respect to
+//! the masses, positive, and zero for rigid motion. The inertia `M (1 + b D)^-1` is therefore symmetric and
+//! positive: energy stays bounded for any behaviour of the soil, and forces conserve linear and angular
+//! momentum as before.
 
 use crate::{
     edges::dashpots::{Dashpot, Dashpots},
@@ -17,17 +18,18 @@ use crate::{
 use sandboil_sph::{Csr, LeastSquaresFit, Vec2, WendlandQuintic};
 use std::collections::BTreeMap;
 
-/// The correction at work in a stage.
+/// The correction in a stage.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Dispersion {
     /// `b`, m2.
     coefficient: f64,
-    /// Of every stress node, what its share of `b M D` is made of.
+    /// Flux at every stress node, from which `b M D` is summed.
     flux: Vec<Flux>,
 }
 
-/// Stress `(xx, xy)` of `K_1` times volume and `b`, kN. With unit speeds Lame's constants are `mu = rho`, `lambda =
-/// -rho`, so that only shape counts: `xx = -yy = rho (a_x,x - a_y,y)` and `xy = rho (a_x,y + a_y,x)`.
+/// Stress `(xx, xy)` of `K_1` times volume and `b`, kN. With unit speeds Lame's constants are `mu = rho`,
+/// `lambda = -rho`, so that only changes of shape matter: `xx = -yy = rho (a_x,x - a_y,y)` and `xy = rho
+/// (a_x,y + a_y,x)`.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct Flux {
     normal: f64,
@@ -35,7 +37,7 @@ struct Flux {
 }
 
 impl Flux {
-    /// Of the acceleration gradients' rows, scaled to `b` times mass, Mg/m m2.
+    /// From the rows of the acceleration gradient; `scale` is `b` times mass, Mg/m m2.
     #[inline]
     fn new(x: Vec2, y: Vec2, scale: f64) -> Self {
         Self { normal: scale * (x.x - y.y), shear: scale * (x.y + y.x) }
@@ -47,21 +49,21 @@ impl Flux {
         [self.normal, self.shear, self.shear, -self.normal]
     }
 
-    /// Force through plain weights, kN/m.
+    /// Force by a gradient weight without images, kN/m.
     #[inline]
     fn through(self, g: Vec2) -> Vec2 {
         Vec2::new(self.normal * g.x + self.shear * g.y, self.shear * g.x - self.normal * g.y)
     }
 }
 
-/// `b` on the undeformed lattice, m2: what its gradient loses of a wave along an axis, from the third moments of the
-/// stencil, and from the second ones, which do not vanish off the lattice's centres of symmetry. The mean of both axes;
-/// on a square lattice every other direction is within a hundredth of it.
+/// `b` on the undeformed lattice, m2, for waves along an axis, from the third moments of the stencil and from
+/// the second moments, which are not zero away from the lattice's centres of symmetry. The mean of both axes
+/// is used; on a square lattice `b` of every other direction is within a hundredth of it.
 fn coefficient(model: &Model) -> f64 {
     let kernel = WendlandQuintic::new(model.smoothing_length());
     let at = stress_node_positions(&[Vec2::zeros()], model.spacing)[0];
     let members = lattice(model, at);
-    // A kernel too narrow for a fit strains nothing, so that there is nothing to correct.
+    // With a kernel too narrow for a fit there is no strain, and nothing to correct.
     let Ok(fit) = LeastSquaresFit::new(&members, kernel) else { return 0.0 };
     let lost = |axis: Vec2| {
         let (mut second, mut third) = (Vec2::zeros(), 0.0);
@@ -75,8 +77,9 @@ fn coefficient(model: &Model) -> f64 {
     0.5 * (lost(Vec2::x()) + lost(Vec2::y()))
 }
 
-/// Masses of the nodes, Mg/m: every stress node's goes to the nodes as the fit's value there is made of them. They are
-/// what the operator gives an accelerated row beside an edge or a contact; inside the ground they are the nodes' own.
+/// Masses of the nodes, Mg/m: the mass of each stress node is distributed by the weights of the fit's value
+/// there. These masses are consistent with the operator for rows beside an edge or a contact; inside the
+/// ground they are the nodes' own masses.
 pub fn lumped_masses(value: &Csr<f64>, points: &[StressPoint], nodes: usize) -> Vec<f64> {
     let mut mass = vec![0.0; nodes];
     for (s, point) in points.iter().enumerate() {
@@ -99,7 +102,7 @@ impl Dispersion {
         self.coefficient
     }
 
-    /// Gathers the accelerations that the forces give the bare masses, m/s2.
+    /// Gathers the accelerations of the nodes without correction, m/s2.
     pub fn gather(
         &mut self,
         threaded: bool,
@@ -119,7 +122,7 @@ impl Dispersion {
         });
     }
 
-    /// What the correction adds to the acceleration of velocity node `j`, m/s2.
+    /// Correction of the acceleration of velocity node `j`, m/s2.
     #[inline]
     pub fn acceleration(&self, geometry: &Geometry, j: usize, mass: f64) -> Vec2 {
         let mut sum = Vec2::zeros();
@@ -132,8 +135,8 @@ impl Dispersion {
         sum / mass
     }
 
-    /// What the correction adds to the accelerations under a unit force of each dashpot through its trace, 1/Mg: their
-    /// tractions are found after all other forces have acted.
+    /// Correction of the accelerations by a unit force of each dashpot, 1/Mg. The tractions of dashpots are
+    /// found after all other forces have acted.
     pub fn spread(
         &self,
         geometry: &Geometry,
@@ -187,7 +190,7 @@ pub(crate) mod tests {
         run::time_step::{CORRECTED_FILTER, CORRECTED_RESPONSE, DRAINED_COEFFICIENT, FILTER_EIGENVALUE},
         section::{
             description::STRESS_NODES,
-            outline::{Condition, Outline, Side, Support, Walls},
+            outline::{Condition, EdgesView, Outline, Side, Support, Walls},
         },
         skeleton::{
             contacts::Contacts,
@@ -198,7 +201,7 @@ pub(crate) mod tests {
     };
     use nalgebra::{DMatrix, DVector};
 
-    /// A block of unit volumes as waves see it.
+    /// The operators and masses of a block of unit volumes.
     pub(crate) struct Block {
         pub geometry: Geometry,
         pub points: Vec<StressPoint>,
@@ -207,24 +210,24 @@ pub(crate) mod tests {
     }
 
     impl Block {
-        /// Of one density, and of regions with shear moduli and moduli of confined compression.
+        /// A block of one density; `moduli` are the shear moduli and confined moduli of the regions.
         pub fn new(model: &Model, walls: Walls, moduli: &[[f64; 2]], density: f64) -> Self {
-            let walls = (&model.outline, walls);
+            let edges = EdgesView { outline: &model.outline, walls };
             let nodes = model.nodes();
-            let mut geometry = Geometry::build(model, &model.position, &vec![1.0; nodes], walls, None);
+            let mut geometry = Geometry::build(model, &model.position, &vec![1.0; nodes], edges, None);
             let point = |s: usize| {
                 let [shear_modulus, stiffness] = moduli[model.region[s / STRESS_NODES] as usize];
                 StressPoint { density, volume: 0.5, shear_modulus, stiffness, ..StressPoint::default() }
             };
             let points: Vec<StressPoint> = (0..STRESS_NODES * nodes).map(point).collect();
-            let value = stress_node_values(model, &model.position, walls);
+            let value = stress_node_values(model, &model.position, edges);
             let mut mass = lumped_masses(&value, &points, nodes);
             let contacts = Contacts::new(model, &points);
-            contacts.sharpen(model, &model.position, &points, &value, (&mut geometry, &mut mass));
+            contacts.sharpen(model, &model.position, &points, &value, &mut geometry, &mut mass);
             Self { geometry, points, mass, coefficient: coefficient(model) }
         }
 
-        /// A matrix on accelerations over masses, made symmetric by their roots.
+        /// A matrix divided by the roots of the masses on both sides, so that it stays symmetric.
         pub fn scaled(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
             let root = |k: usize| self.mass[k / 2].sqrt();
             DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] / (root(i) * root(j)))
@@ -269,7 +272,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// The upper `rows` rows of a block are another region.
+    /// The block with its upper `rows` rows as another region.
     pub(crate) fn layered(mut model: Model, rows: usize) -> Model {
         let top = model.position.iter().map(|x| x.y).fold(f64::NEG_INFINITY, f64::max);
         for (region, x) in model.region.iter_mut().zip(&model.position) {
@@ -279,8 +282,8 @@ pub(crate) mod tests {
         model
     }
 
-    /// The inverse of the inertia is symmetric, at least that of the masses, and the same on rigid motion, rotation
-    /// included; and the masses are positive and the whole of the block's.
+    /// The inverse of the inertia is symmetric, at least as large as that of the masses, and equal to it for
+    /// rigid motion, rotation included. The masses are positive, and their sum is that of the block.
     #[test]
     fn the_inertia_is_symmetric_and_keeps_momentum() {
         for ratio in [1.0, 1.2, 1.4, 1.6] {
@@ -310,7 +313,8 @@ pub(crate) mod tests {
         }
     }
 
-    /// Beside a side that is held the ground goes on: nodes keep their own mass there, but not below a surface.
+    /// Images continue the ground beyond a held side: nodes keep their own mass there, but not at a free
+    /// surface.
     #[test]
     fn nodes_beside_a_held_side_keep_their_mass() {
         const SIDE: usize = 13;
@@ -336,12 +340,12 @@ pub(crate) mod tests {
         eigenvalues.max()
     }
 
-    /// With corrected inertia no mode of a free block is faster, or more strongly filtered, than the time step reckons
-    /// with, at Poisson's ratios of 0, 0.3 and 0.48, uniform or under a layer of a hundredth or a hundred times the
-    /// stiffness.
+    /// With corrected inertia no mode of a free block is faster, or more strongly filtered, than the time
+    /// step assumes, at Poisson's ratios of 0, 0.3 and 0.48, uniform or under a layer of a hundredth or a
+    /// hundred times the stiffness.
     #[test]
     fn limit_of_the_time_step() {
-        // Well above the least speed of the filter, kPa.
+        // Shear modulus with a wave speed well above the least speed of the filter, kPa.
         const STIFF: f64 = 1e4;
         for ratio in [1.0, 1.2, 1.4, 1.6] {
             for (rows, contrast) in [(0, 1.0), (3, 0.01), (5, 4.0), (5, 100.0)] {
@@ -367,14 +371,17 @@ pub(crate) mod tests {
         }
     }
 
-    /// The accelerations that the dashpots' tractions are given by their table are the correction itself.
+    /// The table of accelerations by the dashpots' tractions agrees with the correction itself.
     #[test]
-    fn tractions_meet_the_same_inertia() {
+    fn dashpot_tractions_get_the_same_correction() {
         let mut model = disordered(8, 0.1);
         model.outline = Outline::level(-0.5);
         let nodes = model.nodes();
-        let walls = (&model.outline, Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]));
-        let geometry = Geometry::build(&model, &model.position, &vec![1.0; nodes], walls, None);
+        let edges = EdgesView {
+            outline: &model.outline,
+            walls: Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]),
+        };
+        let geometry = Geometry::build(&model, &model.position, &vec![1.0; nodes], edges, None);
         let points =
             vec![StressPoint { density: 2.0, volume: 0.5, ..StressPoint::default() }; STRESS_NODES * nodes];
         let mass: Vec<f64> = (0..nodes).map(|j| 1.0 + 0.01 * j as f64).collect();

@@ -1,8 +1,9 @@
-//! How much solid and water the volume of a node holds (Eqs 1 and 5).
+//! Solid and water in the volume of a node (Eqs 1 and 5).
 //!
-//! Grains neither compress nor leave their node, so porosity, density and volume are one unknown: with the volume
-//! `V` moving as `d ln V / dt = div v`, `n = 1 - V_s / V` is Eq. 1 integrated exactly, at any porosity step between
-//! layers. The divergence is that of the stress nodes, whose accumulated strain gives `ln V` for nothing.
+//! Grains neither compress nor leave their node, so porosity, density and volume are one unknown: with `d ln
+//! V / dt = div v` for the volume `V`, `n = 1 - V_s / V` is the exact integral of Eq. 1, at any jump of
+//! porosity between layers. The divergence is that of the stress nodes: their accumulated strain gives `ln
+//! V`.
 
 use crate::{
     section::description::{Model, STRESS_NODES},
@@ -10,7 +11,7 @@ use crate::{
 };
 use std::ops::RangeInclusive;
 
-/// Porosities a soil can have: outside, a grain packing is no longer described.
+/// Range of porosities for which a grain packing is a valid description.
 const POROSITY_RANGE: RangeInclusive<f64> = 0.05..=0.95;
 /// Volumes, porosities and masses of the velocity nodes.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
@@ -79,8 +80,9 @@ impl Phases {
         })
     }
 
-    /// Takes over the volume strain of the stress nodes. Returns how many porosities had to be kept in range.
-    pub fn follow(&mut self, points: &[StressPoint]) -> u64 {
+    /// Updates the volumes from the strain of the stress nodes. Returns how many porosities were clipped to
+    /// their range.
+    pub fn update_volumes(&mut self, points: &[StressPoint]) -> u64 {
         let mut clipped = 0;
         for (node, volume) in self.volume.iter_mut().enumerate() {
             let own = &points[STRESS_NODES * node..STRESS_NODES * (node + 1)];
@@ -88,7 +90,7 @@ impl Phases {
             let wanted = self.unstrained[node] * (strain / STRESS_NODES as f64).exp();
             let least = self.solid[node] / (1.0 - POROSITY_RANGE.start());
             let most = self.solid[node] / (1.0 - POROSITY_RANGE.end());
-            // A soil that begins outside the range may stay where it is.
+            // A soil that starts outside the range may keep its porosity.
             let (least, most) = (least.min(self.unstrained[node]), most.max(self.unstrained[node]));
             *volume = wanted.clamp(least, most);
             clipped += u64::from(*volume != wanted);
@@ -96,7 +98,7 @@ impl Phases {
         clipped
     }
 
-    /// Makes the present volumes those of zero strain: strains start anew with a stage.
+    /// Makes the present volumes those of zero strain: strains count from the start of a stage.
     pub fn restart_strain(&mut self) {
         self.unstrained.copy_from_slice(&self.volume);
     }
@@ -113,7 +115,7 @@ mod tests {
     use crate::testing::square_block;
 
     #[test]
-    fn porosity_follows_the_volume_of_the_grains() {
+    fn porosity_conserves_the_volume_of_the_grains() {
         let model = square_block(2);
         let mut phases = Phases::new(&model);
         let mut points = vec![StressPoint::default(); STRESS_NODES * model.nodes()];
@@ -121,7 +123,7 @@ mod tests {
         for point in &mut points[..STRESS_NODES] {
             point.strain = [0.06, -0.16, 0.3];
         }
-        assert_eq!(phases.follow(&points), 0);
+        assert_eq!(phases.update_volumes(&points), 0);
         // Eq. 1 integrated: (1 - n) V is constant, V = V_0 exp(volume strain).
         assert!((phases.volume()[0] - (-0.1_f64).exp()).abs() < 1e-15);
         assert!((1.0 - phases.porosity(0) - 0.5 * 0.1_f64.exp()).abs() < 1e-15);
@@ -137,7 +139,7 @@ mod tests {
         for point in &mut points {
             point.strain = [-5.0, 0.0, 0.0];
         }
-        assert_eq!(phases.follow(&points), model.nodes() as u64);
+        assert_eq!(phases.update_volumes(&points), model.nodes() as u64);
         assert!((phases.porosity(0) - 0.05).abs() < 1e-14);
     }
 }

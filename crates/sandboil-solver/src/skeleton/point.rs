@@ -1,9 +1,9 @@
-//! What a stress node carries besides the state of its soil model.
+//! Fields of a stress node besides the state of its soil model.
 
 use crate::skeleton::deformation::Deformation;
 use sandboil_soil::Stress;
 
-/// What a stress node carries besides the state of its soil model.
+/// Fields of a stress node besides the state of its soil model.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct StressPoint {
     /// Effective stress, kPa, tension positive.

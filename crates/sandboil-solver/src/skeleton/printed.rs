@@ -7,7 +7,7 @@ use crate::{
 use sandboil_soil::Stress;
 use sandboil_sph::Vec2;
 
-/// Stresses that the printed force needs beside those of the stress nodes.
+/// Stresses that the printed force needs besides those of the stress nodes.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct PrintedStress {
     /// Effective stress `(xx, yy, xy)` at velocity nodes, Eq. 10.
@@ -22,8 +22,8 @@ impl PrintedStress {
         size_of_val(self.node.as_slice()) + size_of_val(self.ghost.as_slice())
     }
 
-    /// Evaluates Eqs 10 and 11. Below a base that carries no shear but the dashpots' the ghosts' shear mirrors with
-    /// opposite sign.
+    /// Evaluates Eqs 10 and 11. Below a base whose only shear traction is that of the dashpots, the shear
+    /// stress of the ghosts is mirrored with the opposite sign.
     pub fn update(&mut self, tables: &PrintedTables, points: &[StressPoint]) {
         self.node.clear();
         self.node.extend((0..tables.interpolation.rows()).map(|i| {
@@ -75,14 +75,14 @@ mod tests {
     use crate::{
         section::{
             description::{Operators, Region, STRESS_NODES},
-            outline::Walls,
+            outline::EdgesView,
         },
         testing::square_block,
         weights::geometry::Geometry,
     };
     use sandboil_soil::Stress;
 
-    /// Eq. 6 term by term, with masses and densities as it prints them, where two soils meet.
+    /// Eq. 6 term by term as printed, with masses and densities, at a contact of two soils.
     #[test]
     fn printed_force_is_equation_6() {
         const SIDE: usize = 6;
@@ -91,8 +91,8 @@ mod tests {
         model.regions.push(Region { porosity: 0.2, ..model.regions[0].clone() });
         model.region = (0..model.nodes()).map(|node| u32::from(node >= 18)).collect();
         let phases = Phases::new(&model);
-        let walls = (&model.outline, Walls::statics(&model.outline));
-        let geometry = Geometry::build(&model, &model.position, phases.volume(), walls, None);
+        let edges = EdgesView::statics(&model.outline);
+        let geometry = Geometry::build(&model, &model.position, phases.volume(), edges, None);
         let points: Vec<StressPoint> = (0..STRESS_NODES * model.nodes())
             .map(|s| StressPoint {
                 stress: Stress { xx: s as f64, yy: 2.0 * s as f64, xy: -0.5 * s as f64, zz: 0.0 },

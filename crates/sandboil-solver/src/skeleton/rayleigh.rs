@@ -1,4 +1,5 @@
-//! Rayleigh damping: a drag in proportion to mass and a viscous stress in proportion to the soil's elastic stiffness.
+//! Rayleigh damping: a drag proportional to mass and a viscous stress proportional to the soil's elastic
+//! stiffness.
 
 use crate::{
     error::SolverError,
@@ -13,9 +14,10 @@ use sandboil_soil::{StrainIncrement, Stress};
 use sandboil_sph::Vec2;
 use std::f64::consts::PI;
 
-/// Largest damping ratio: above it soil is no oscillator any more.
+/// Largest damping ratio that is accepted.
 const LARGEST_RATIO: f64 = 0.3;
-/// A damping ratio that holds at two frequencies: `xi(w) = a / (2 w) + b w / 2`, less between them, more outside.
+/// A damping ratio that is exact at two frequencies: `xi(w) = a / (2 w) + b w / 2` is less between them and
+/// more outside.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rayleigh {
     /// Damping ratio at both frequencies, 1.
@@ -25,7 +27,7 @@ pub struct Rayleigh {
 }
 
 impl Rayleigh {
-    /// Refuses what is no damping.
+    /// Refuses values outside their range.
     ///
     /// # Errors
     /// A ratio outside (0, 0.3], or frequencies that are not positive and ascending.
@@ -55,22 +57,22 @@ impl Rayleigh {
         self.ratio / (PI * (low + high))
     }
 
-    /// What a wave of a circular frequency (rad/s) loses of its velocity in a second, `2 xi w = a + b w^2`, 1/s.
+    /// Decay rate of the velocity of a wave with a circular frequency (rad/s), `2 xi w = a + b w^2`, 1/s.
     pub fn rate(&self, frequency: f64) -> f64 {
         self.mass_coefficient() + self.stiffness_coefficient() * frequency * frequency
     }
 }
 
-/// Rayleigh damping at work in a stage.
+/// Rayleigh damping in a stage.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct RayleighDamping {
     law: Rayleigh,
-    /// Volume times nominal viscous stress of every stress node, kN/m: what walls feel of it.
+    /// Volume times nominal viscous stress of every stress node, kN/m, for the weights by images.
     tensor: Vec<[f64; 4]>,
 }
 
 impl RayleighDamping {
-    /// Damping without motion yet, of `points` stress nodes.
+    /// Damping of `points` stress nodes at rest.
     pub fn new(law: Rayleigh, points: usize) -> Self {
         Self { law, tensor: vec![[0.0; 4]; points] }
     }
@@ -80,8 +82,8 @@ impl RayleighDamping {
         &self.law
     }
 
-    /// Adds the viscous stress of a velocity field to what the force loop gathers. The soil's own stress, which
-    /// its model remembers and people read, stays without it.
+    /// Adds the viscous stress of a velocity field to the shares that the force loop gathers. The effective
+    /// stress, which is the soil model's state and an output, does not include it.
     pub fn add_stress(
         &mut self,
         threaded: bool,
@@ -104,8 +106,8 @@ impl RayleighDamping {
         });
     }
 
-    /// Force on velocity node `j` that the shares do not hold, kN/m: the walls' part of the viscous stress, and the
-    /// drag `-a m v` against the absolute velocity.
+    /// Force on velocity node `j` that is not in the shares, kN/m: the viscous stress through the weights by
+    /// images, and the drag `-a m v` against the absolute velocity.
     #[inline]
     pub fn force(&self, geometry: &Geometry, j: usize, mass: f64, velocity: Vec2) -> Vec2 {
         let mut force = velocity * (-self.law.mass_coefficient() * mass);
@@ -121,8 +123,8 @@ impl RayleighDamping {
     }
 }
 
-/// Stress `b C_e : d` of a strain rate `d` (1/s) with the point's present elastic moduli, kPa, tension positive: it
-/// fades as the soil softens.
+/// Stress `b C_e : d` of a strain rate `d` (1/s) with the point's present elastic moduli, kPa, tension
+/// positive: it decreases as the soil softens.
 fn viscous_stress(point: &StressPoint, rate: &StrainIncrement, coefficient: f64) -> Stress {
     let (confined, shear) = (coefficient * point.stiffness, coefficient * point.shear_modulus);
     let volumetric = (confined - 2.0 * shear) * (rate.xx + rate.yy);
@@ -140,7 +142,7 @@ mod tests {
     use crate::{
         section::{
             description::STRESS_NODES,
-            outline::{Condition, Outline, Walls},
+            outline::{Condition, EdgesView, Outline, Walls},
         },
         skeleton::strain_and_force::conservative_force,
         testing::square_block,
@@ -159,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_damping_is_refused() {
+    fn invalid_damping_is_refused() {
         for (ratio, frequencies) in [
             (0.0, [1.0, 10.0]),
             (0.31, [1.0, 10.0]),
@@ -173,15 +175,18 @@ mod tests {
         assert!(DAMPING.validate().is_ok());
     }
 
-    /// The force of a velocity field is `b` times that of the stress which a displacement of the same shape leaves
-    /// in an elastic block, walls included, and the drag.
+    /// The force of a velocity field is the drag, and `b` times the elastic force of a displacement field of
+    /// the same shape, images included.
     #[test]
     fn the_force_is_in_proportion_to_stiffness_and_mass() {
         let mut model = square_block(6);
         model.outline = Outline::level(-0.5);
         let nodes = model.nodes();
-        let walls = (&model.outline, Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]));
-        let geometry = Geometry::build(&model, &model.position, &vec![1.0; nodes], walls, None);
+        let edges = EdgesView {
+            outline: &model.outline,
+            walls: Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]),
+        };
+        let geometry = Geometry::build(&model, &model.position, &vec![1.0; nodes], edges, None);
         let velocity: Vec<Vec2> =
             (0..nodes).map(|j| Vec2::new((1.3 * j as f64).sin(), (2.1 * j as f64).cos())).collect();
         let still = vec![Vec2::zeros(); nodes];

@@ -1,4 +1,4 @@
-//! A view of a section as it stands.
+//! A view of the present section.
 
 use crate::{
     section::{
@@ -11,25 +11,26 @@ use crate::{
 };
 use sandboil_sph::Vec2;
 
-/// A section as it stands.
+/// The present section.
 #[derive(Clone, Copy)]
 pub struct SectionView<'a> {
     /// Its description.
     pub model: &'a Model,
-    /// Its edges as they stand.
+    /// Its edges at their present place.
     pub outline: &'a Outline,
     /// How the edges act.
     pub walls: Walls,
     /// Its nodes along the edges.
     pub edges: &'a EdgeNodes,
-    /// Present places of the nodes, m.
+    /// Present positions of the nodes, m.
     pub position: &'a [Vec2],
     /// Volumes, porosities and densities.
     pub phases: &'a Phases,
     /// Mass of each node, Mg/m.
     pub mass: &'a [f64],
-    /// Weights at the present place.
+    /// Weights at the present positions.
     pub geometry: &'a Geometry,
-    /// Outward normals of the nodes at the free surface, if it is found instead of tied to the nodes of the lattice.
+    /// Outward normals of the nodes at the free surface, if it is found from the nodes and not given by the
+    /// lattice.
     pub free_surface: Option<&'a [Option<Vec2>]>,
 }

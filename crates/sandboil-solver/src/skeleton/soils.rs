@@ -29,13 +29,13 @@ struct Group {
 #[derive(Debug, serde::Deserialize)]
 #[serde(try_from = "StoredLaw")]
 enum Law {
-    /// Linear elasticity remembers nothing but the stress, which the stress nodes hold already.
+    /// Linear elasticity: its only state is the stress, which the stress nodes hold.
     Elastic(Elastic),
-    /// A model with a state, and the soil it came from.
+    /// A model with a state, and the soil from which it was made.
     Plastic(Soil, Box<dyn Plastic>),
 }
 
-/// A [`Law`] as it is stored: whichever state a plastic model has, as bytes.
+/// A [`Law`] as it is stored: the states of a plastic model as bytes.
 #[derive(serde::Serialize, serde::Deserialize)]
 enum StoredLaw {
     Elastic(Elastic),
@@ -73,7 +73,7 @@ impl TryFrom<StoredLaw> for Law {
 pub struct StressWork {
     /// With the mean of the stresses before and after it.
     pub mean: f64,
-    /// With the stress after it; zero where it is not asked for.
+    /// With the stress after it; zero if it is not requested.
     pub after: f64,
 }
 
@@ -82,7 +82,8 @@ impl StressWork {
     #[inline]
     fn add(&mut self, before: &Stress, point: &StressPoint, increment: &StrainIncrement, with_after: bool) {
         let StrainIncrement { xx, yy, xy, .. } = increment;
-        // That in the middle of the step: an end of it would give or take energy, at first order in its strain.
+        // The volume at mid-step. That at either end would cause an energy error of first order in the strain
+        // of the step.
         let volume = point.volume * point.deformation.volume_ratio() * (1.0 - 0.5 * (xx + yy));
         let after = &point.stress;
         let twice = (before.xx + after.xx) * xx + (before.yy + after.yy) * yy + (before.xy + after.xy) * xy;
@@ -110,9 +111,10 @@ struct Outcome {
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct SoilField {
     groups: Vec<Group>,
-    /// Stress nodes whose soil could not carry the stress they began with.
+    /// Stress nodes whose soil could not carry their initial stress.
     inadmissible_starts: u64,
-    /// Of the chunks of the longest group, in a step. A field that was restored has none before its first step.
+    /// Outcomes of the chunks of the longest group in a step; empty in a restored field before its first
+    /// step.
     #[serde(skip)]
     outcomes: Vec<Outcome>,
     /// Largest strain component of one step.
@@ -144,7 +146,7 @@ pub struct StressRows<'a> {
     pub shares: &'a mut [NodalShare],
 }
 
-/// Rows under a model with a state, whichever it is: the call through the table is one for each group and step.
+/// Rows of stress nodes under any model with a state. There is one dynamic call for each group and step.
 trait Plastic: Debug + Send + Sync {
     fn step(
         &mut self,
@@ -158,17 +160,17 @@ trait Plastic: Debug + Send + Sync {
     fn void_ratio(&self, row: usize) -> Option<f64>;
     fn points(&self) -> usize;
     fn state_bytes(&self) -> usize;
-    /// The states as they are stored.
+    /// The states in their stored form.
     fn states(&self) -> postcard::Result<Vec<u8>>;
 }
 
 #[derive(Debug)]
-struct Rowed<M: SoilModel> {
+struct PlasticRows<M: SoilModel> {
     model: M,
     states: Vec<M::State>,
 }
 
-impl<M: SoilModel> Plastic for Rowed<M> {
+impl<M: SoilModel> Plastic for PlasticRows<M> {
     fn step(
         &mut self,
         threaded: bool,
@@ -188,7 +190,7 @@ impl<M: SoilModel> Plastic for Rowed<M> {
                 let s = first_row + first + k;
                 let motion = motion(geometry, s, velocity);
                 let increment = motion.advance(&mut point.deformation, dt);
-                match bounded(&increment, largest_strain)
+                match check_size(&increment, largest_strain)
                     .and_then(|()| model.update(state, &increment, integrator))
                 {
                     Ok(report) => outcome.report.merge(&report),
@@ -223,15 +225,15 @@ impl<M: SoilModel> Plastic for Rowed<M> {
     }
 }
 
-/// Largest strain component of one step: a thousand times what an earthquake does, and far below what plasticity
-/// would need minutes to follow. Beyond it the run has diverged.
+/// Largest strain component of one step: a thousand times that of an earthquake, and small enough to be
+/// integrated in a short time. Beyond it the run has diverged.
 const LARGEST_STEP: f64 = 0.02;
-/// The same with large displacements: where a few grains touch, a step may turn them over.
-const LARGEST_STEP_OF_GRAINS: f64 = 0.5;
-/// Refuses the strain of a diverging run before the soil model goes through it.
-fn bounded(increment: &StrainIncrement, limit: f64) -> Result<(), SoilError> {
+/// The same with large displacements: a step may rotate a few nodes that touch each other.
+const LARGEST_STEP_OF_LARGE_DISPLACEMENTS: f64 = 0.5;
+/// Refuses the strain of a diverging run before the soil model integrates it.
+fn check_size(increment: &StrainIncrement, limit: f64) -> Result<(), SoilError> {
     let value = increment.xx.abs().max(increment.yy.abs()).max(increment.xy.abs());
-    // NaN goes on to the model, which names it.
+    // NaN passes: the model reports it.
     if value > limit {
         return Err(SoilError::StrainIncrementTooLarge { value, limit });
     }
@@ -273,8 +275,8 @@ impl SoilField {
         })
     }
 
-    /// Dynamics: every region's own model, its state made from the stress that is there and a void ratio common to
-    /// all, or the model's own.
+    /// Dynamics: every region with its own model, initialised at the present stress with a given void ratio,
+    /// or the model's own.
     ///
     /// # Errors
     /// [`SolverError::Soil`] where a model refuses the stress.
@@ -315,11 +317,12 @@ impl SoilField {
 
     /// Allows the strain steps of large displacements.
     pub fn allow_large_steps(&mut self) {
-        self.largest_strain = LARGEST_STEP_OF_GRAINS;
+        self.largest_strain = LARGEST_STEP_OF_LARGE_DISPLACEMENTS;
     }
 
-    /// Moves every stress node through one step: strain from the velocity field, stress from the soil model,
-    /// and the share that the force loop will gather. Returns the counts of the models and the work of the stress.
+    /// Advances every stress node by one step: strain from the velocity field, stress from the soil model,
+    /// and the share that the force loop will gather. Returns the counts of the models and the work of the
+    /// stress.
     ///
     /// # Errors
     /// [`SolverError::Soil`] with the first node, in order, whose model failed.
@@ -342,7 +345,7 @@ impl SoilField {
             let b = &mut shares[group.rows.clone()];
             match &mut group.law {
                 Law::Elastic(elastic) => {
-                    // A slice of nothing, which takes no memory: the loop writes two arrays.
+                    // The loop writes two arrays; the third has no size.
                     let c = &mut vec![(); a.len()];
                     for_each_chunk(threaded, Rows { a, b, c }, outcomes, |first, rows, outcome| {
                         let mut work = StressWork::default();
@@ -371,7 +374,7 @@ impl SoilField {
                     }
                 }
             }
-            // In order, whatever thread made them.
+            // In a fixed order, so that the sum is the same with any number of threads.
             for outcome in &*outcomes {
                 work.merge(&outcome.work);
             }
@@ -395,7 +398,7 @@ impl SoilField {
         })
     }
 
-    /// Stress nodes whose soil could not carry the stress they began with, and took the nearest that it can.
+    /// Stress nodes whose soil could not carry their initial stress and took the nearest that it can carry.
     pub fn inadmissible_starts(&self) -> u64 {
         self.inadmissible_starts
     }
@@ -411,8 +414,8 @@ impl SoilField {
     }
 }
 
-/// States of one region's rows, and the stress and stiffness they give their points; and how many of them could not
-/// carry their stress.
+/// Makes the states of one region's rows and sets the stress and moduli of their points. Returns the states,
+/// and how many rows could not carry their stress.
 fn plastic_rows<M: SoilModel + 'static>(
     law: &M,
     region: usize,
@@ -433,11 +436,11 @@ fn plastic_rows<M: SoilModel + 'static>(
         set_moduli(&mut points[s], law.moduli(&state));
         states.push(state);
     }
-    Ok((Box::new(Rowed { model: law.clone(), states }), replaced))
+    Ok((Box::new(PlasticRows { model: law.clone(), states }), replaced))
 }
 
 fn restored_rows<M: SoilModel + 'static>(law: &M, states: &[u8]) -> postcard::Result<Box<dyn Plastic>> {
-    Ok(Box::new(Rowed { model: law.clone(), states: postcard::from_bytes(states)? }))
+    Ok(Box::new(PlasticRows { model: law.clone(), states: postcard::from_bytes(states)? }))
 }
 
 fn set_moduli(point: &mut StressPoint, moduli: Moduli) {

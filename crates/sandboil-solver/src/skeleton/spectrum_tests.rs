@@ -1,10 +1,10 @@
-//! Spectra of the skeleton operators: what waves they carry, what they cannot resolve, and whether a free block
-//! is stable. Lengths in spacings, frequencies in wave speed over spacing.
+//! Spectra of the skeleton operators: speeds of waves, waves that are not resolved, and stability of a free
+//! block. Lengths in spacings, frequencies in wave speed over spacing.
 
 use crate::{
     section::{
         description::{Model, Operators, STRESS_NODES, stress_node_offset},
-        outline::Walls,
+        outline::EdgesView,
     },
     skeleton::{
         deformation::Deformation,
@@ -26,9 +26,9 @@ use std::f64::consts::PI;
 /// Lame's constants over the density: unit shear-wave speed, Poisson's ratio 0.3.
 pub const SHEAR: f64 = 1.0;
 const LAME: f64 = 1.5;
-/// How the operators of an unbounded lattice see plane waves.
+/// Plane waves under the operators of an unbounded lattice.
 struct Lattice {
-    /// Per stress node of the central velocity node: offsets and gradient weights of its neighbours.
+    /// For each stress node of the central velocity node: offsets and gradient weights of its neighbours.
     stencils: [Vec<(Vec2, Vec2)>; STRESS_NODES],
 }
 
@@ -39,8 +39,8 @@ impl Lattice {
         model.numerics.operators = operators;
         model.numerics.smoothing_ratio = smoothing_ratio;
         let volume = vec![1.0; model.nodes()];
-        let walls = (&model.outline, Walls::statics(&model.outline));
-        let geometry = Geometry::build(&model, &model.position, &volume, walls, None);
+        let edges = EdgesView::statics(&model.outline);
+        let geometry = Geometry::build(&model, &model.position, &volume, edges, None);
         let centre = SIDE * (SIDE / 2) + SIDE / 2;
         let origin = model.position[centre];
         let stencil = |s: usize| {
@@ -94,7 +94,8 @@ fn roots(matrix: &Matrix2<Complex<f64>>) -> [f64; 2] {
     [half - root, half + root]
 }
 
-/// The weighted fit's waves are a twentieth less slow than those of the corrected kernel of Eq. 8.
+/// Waves are slower than exact; with the weighted fit by a twentieth less than with the corrected kernel of
+/// Eq. 8.
 #[test]
 fn phase_speed_of_shear_waves() {
     for (operators, ratio, slow) in [
@@ -110,7 +111,7 @@ fn phase_speed_of_shear_waves() {
             let k = 2.0 * PI / points;
             let found = 1.0 - lattice.shear_frequency(Vec2::new(0.0, k)) / k;
             println!(
-                "{operators:?} h/dx {ratio}, {points} points per wavelength: {:.2} % slow",
+                "{operators:?} h/dx {ratio}, {points} points per wavelength: {:.2} % too slow",
                 100.0 * found
             );
             assert!((found - expected).abs() < 0.03 * expected + 5e-4, "{found} {expected}");
@@ -118,8 +119,8 @@ fn phase_speed_of_shear_waves() {
     }
 }
 
-/// With corrected inertia shear and compression waves of any direction are right to fourth order: the error of their
-/// speed falls by nearly sixteen from 20 to 40 points per wavelength.
+/// With corrected inertia shear and compression waves of any direction are accurate to fourth order: from 20
+/// to 40 points per wavelength the error of their speed falls by a factor of nearly sixteen.
 #[test]
 fn corrected_phase_speed_is_of_fourth_order() {
     for (ratio, bound) in [(1.0, 6e-4), (1.2, 1.1e-3), (1.4, 2e-3)] {
@@ -149,10 +150,10 @@ fn corrected_phase_speed_is_of_fourth_order() {
     }
 }
 
-/// Without stress nodes off their velocity node both frequencies would be zero. The checkerboard is what the
-/// velocity filter is for.
+/// Both frequencies would be zero if stress nodes were at their velocity nodes. The velocity filter damps the
+/// checkerboard.
 #[test]
-fn stress_nodes_lift_the_shortest_waves() {
+fn stress_nodes_resist_the_shortest_waves() {
     for (operators, ratio, rows, checkerboard) in [
         (Conservative, 1.4, 0.250, 0.019),
         (Conservative, 1.2, 0.576, 0.098),
@@ -202,8 +203,8 @@ fn acceleration_matrix(model: &Model) -> DMatrix<f64> {
 pub fn elastic_matrix(model: &Model, lame: f64) -> DMatrix<f64> {
     let phases = Phases::new(model);
     let volume = phases.volume().to_vec();
-    let walls = (&model.outline, Walls::statics(&model.outline));
-    let geometry = Geometry::build(model, &model.position, &volume, walls, None);
+    let edges = EdgesView::statics(&model.outline);
+    let geometry = Geometry::build(model, &model.position, &volume, edges, None);
     let nodes = model.nodes();
     let mut matrix = DMatrix::zeros(2 * nodes, 2 * nodes);
     let mut points =
@@ -274,7 +275,7 @@ fn a_free_block_is_stable_with_three_rigid_modes() {
     }
 }
 
-/// The skeleton limit at free surfaces: never below the `0.99 h / c_d` that the time step is taken from.
+/// The skeleton limit at free surfaces: never below `0.99 h / c_d`, from which the time step is taken.
 #[test]
 fn surface_limit_of_the_time_step() {
     let compression_speed = (LAME + 2.0 * SHEAR).sqrt();
@@ -317,13 +318,13 @@ pub fn filter_matrix(geometry: &Geometry, points: &[StressPoint], strength: f64)
     matrix
 }
 
-/// The filter is as strong as the time step reckons with, symmetric, and grows with the current shear-wave speed,
-/// down to 20 m/s.
+/// The filter is as strong as the time step assumes, symmetric, and proportional to the current shear-wave
+/// speed if this is above 20 m/s.
 #[test]
 fn strength_of_the_velocity_filter() {
     let model = square_block(10);
-    let walls = (&model.outline, Walls::statics(&model.outline));
-    let geometry = Geometry::build(&model, &model.position, &vec![1.0; model.nodes()], walls, None);
+    let edges = EdgesView::statics(&model.outline);
+    let geometry = Geometry::build(&model, &model.position, &vec![1.0; model.nodes()], edges, None);
     for (shear_modulus, speed) in [(1e4, 100.0), (1.0, 20.0), (0.0, 20.0)] {
         let point = StressPoint { density: 1.0, volume: 0.5, shear_modulus, ..StressPoint::default() };
         let matrix = filter_matrix(&geometry, &vec![point; STRESS_NODES * model.nodes()], 0.1);

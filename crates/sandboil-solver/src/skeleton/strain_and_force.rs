@@ -7,10 +7,11 @@ use crate::{
 use sandboil_soil::StrainIncrement;
 use sandboil_sph::Vec2;
 
-/// What the force loop gathers from a stress node.
+/// The share of a stress node in the nodal forces, which the force loop gathers.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct NodalShare {
-    /// Volume times nominal stress, less the linear part of the velocity filter: rows meet the gradient weight, kN/m.
+    /// Volume times nominal stress, less the linear part of the velocity filter, kN/m: its rows are
+    /// multiplied by the gradient weights.
     tensor: [f64; 4],
     /// Kernel-weighted mean velocity around the stress node, m/s.
     mean_velocity: Vec2,
@@ -19,19 +20,19 @@ pub struct NodalShare {
 }
 
 impl NodalShare {
-    /// Adds a volume times nominal stress, kN/m, to what the gradient weights meet.
+    /// Adds a volume times nominal stress, kN/m.
     #[inline]
     pub fn add(&mut self, tensor: &[f64; 4]) {
-        for (sum, more) in self.tensor.iter_mut().zip(tensor) {
-            *sum += more;
+        for (sum, term) in self.tensor.iter_mut().zip(tensor) {
+            *sum += term;
         }
     }
 }
 
-/// Least shear-wave speed of the filter, m/s: liquefied soil still needs its short waves damped.
+/// Least shear-wave speed of the filter, m/s: short waves need damping in liquefied soil too.
 pub const LEAST_FILTER_SPEED: f64 = 20.0;
-/// Velocity gradient rows `grad v_x` and `grad v_y` at a stress node in the geometry's frame, walls included, with
-/// the mean velocity and the gradient before walls that the filter needs (Eq. 8 in least-squares form).
+/// Velocity gradient rows `grad v_x` and `grad v_y` at a stress node in the geometry's frame, images
+/// included; for the filter the mean velocity and the gradient without images (Eq. 8 in least-squares form).
 pub struct Motion {
     x: Vec2,
     y: Vec2,
@@ -53,9 +54,9 @@ pub fn motion(geometry: &Geometry, s: usize, velocity: &[Vec2]) -> Motion {
     let (free_x, free_y) = (x, y);
     for (j, weight) in geometry.wall.forward.iter_row(s) {
         let v_j = velocity[j];
-        let (more_x, more_y) = weight.gradients(v_j);
-        x += more_x;
-        y += more_y;
+        let (added_x, added_y) = weight.gradients(v_j);
+        x += added_x;
+        y += added_y;
     }
     Motion { x, y, free_x, free_y, mean_velocity }
 }
@@ -83,12 +84,12 @@ impl Motion {
         StrainIncrement { xx: x.x, yy: y.y, xy: x.y + y.x, spin: 0.5 * (x.y - y.x) }
     }
 
-    /// What the force loop will read of this stress node: its stress, and the filter's linear part.
+    /// Share of the stress node in the nodal forces: its stress, and the filter's linear part.
     ///
-    /// The filter takes from every velocity node its residual against the linear fit, `v_j - v_s - grad v (x_j -
-    /// x_s)`. Summed over a stencil the fit's part is `grad v . c` against the gradient weights, so it joins the
-    /// stress; the rest needs only the mean velocity. The sum is symmetric and vanishes on linear fields.
-    /// `filter` is its strength `xi / dx`, 1/m.
+    /// The filter damps the residual of every velocity node from the linear fit, `v_j - v_s - grad v (x_j -
+    /// x_s)`. Summed over a stencil, the linear part is `grad v . c` times the gradient weights, so it is
+    /// added to the stress; the rest needs only the mean velocity. The sum is symmetric, and zero for linear
+    /// fields. `filter` is its strength `xi / dx`, 1/m.
     #[inline]
     pub fn share(&self, point: &StressPoint, covariance: [f64; 3], filter: f64) -> NodalShare {
         let speed = (point.shear_modulus / point.density).sqrt().max(LEAST_FILTER_SPEED);
@@ -141,7 +142,7 @@ pub(crate) mod tests {
     use crate::{
         section::{
             description::{Model, STRESS_NODES},
-            outline::{Condition, Side, Support, Walls},
+            outline::{Condition, EdgesView, Side, Support, Walls},
         },
         testing::{block, square_block},
     };
@@ -173,13 +174,14 @@ pub(crate) mod tests {
         prop::collection::vec((-range..range, -range..range), count)
     }
 
-    /// Nodes that move with `dx/dt = A X` strain the soil by `A F^-1`: less and less as it grows longer.
+    /// Nodes that move with `dx/dt = A X` strain the soil at the rate `A F^-1`, which decreases as the soil
+    /// gets longer.
     #[test]
-    fn strain_is_taken_in_the_deformed_frame() {
+    fn strain_is_measured_in_the_deformed_frame() {
         const STEPS: u32 = 200;
         let model = square_block(6);
-        let walls = (&model.outline, Walls::statics(&model.outline));
-        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], walls, None);
+        let edges = EdgesView::statics(&model.outline);
+        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], edges, None);
         let velocity: Vec<Vec2> = model.position.iter().map(|x| Vec2::new(0.3 * x.x, 0.0)).collect();
         let mut deformation = Deformation::default();
         let strain: f64 = (0..STEPS)
@@ -188,10 +190,10 @@ pub(crate) mod tests {
         assert!((deformation.xx - 1.3).abs() < 1e-12 && (strain - 1.3_f64.ln()).abs() < 1e-6, "{strain}");
     }
 
-    /// Motions that a sloping base allows are what its images continue: along a smooth one without strain, and in
-    /// proportion to the distance from a rough one, linear at every stress node.
+    /// Images continue the motions that a sloping base allows. Motion along a smooth base causes no strain;
+    /// motion in proportion to the distance from a rough base has the exact gradient at every stress node.
     #[test]
-    fn images_in_a_slope_continue_what_it_allows() {
+    fn images_at_a_slope_continue_allowed_motions() {
         for slope in [0.1_f64, 0.5, 1.0] {
             let mut model = square_block(6);
             let base = [-3.0, 9.0].map(|x| Vec2::new(x, -0.5 - 5.0 * slope + slope * x));
@@ -200,8 +202,11 @@ pub(crate) mod tests {
             let away = Vec2::new(-along.y, along.x);
             let distance = |x: &Vec2| (x - base[0]).dot(&away);
             for (condition, rate) in [(Condition::FreeSlip, 0.0), (Condition::NoSlip, 0.3)] {
-                let walls = (&model.outline, Walls::shaken(&model.outline, condition, [false; 2]));
-                let geometry = Geometry::build(&model, &model.position, &[1.0; 36], walls, None);
+                let edges = EdgesView {
+                    outline: &model.outline,
+                    walls: Walls::shaken(&model.outline, condition, [false; 2]),
+                };
+                let geometry = Geometry::build(&model, &model.position, &[1.0; 36], edges, None);
                 assert!(geometry.wall.forward.entries() > 0);
                 let speed = |x: &Vec2| if rate == 0.0 { 1.0 } else { rate * distance(x) };
                 let velocity: Vec<Vec2> = model.position.iter().map(|x| along * speed(x)).collect();
@@ -216,10 +221,10 @@ pub(crate) mod tests {
 
     /// Simple shear to the right turns the soil clockwise: engineering shear and positive spin.
     #[test]
-    fn shear_has_its_spin() {
+    fn simple_shear_has_positive_spin() {
         let model = square_block(6);
-        let walls = (&model.outline, Walls::statics(&model.outline));
-        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], walls, None);
+        let edges = EdgesView::statics(&model.outline);
+        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], edges, None);
         let velocity: Vec<Vec2> = model.position.iter().map(|x| Vec2::new(0.2 * x.y, 0.0)).collect();
         let rate = motion(&geometry, 30, &velocity).increment(&Deformation::default(), 1.0);
         let expected = StrainIncrement { xx: 0.0, yy: 0.0, xy: 0.2, spin: 0.1 };
@@ -246,14 +251,14 @@ pub(crate) mod tests {
             let base = [
                 Condition::NoSlip, Condition::NoSlip, Condition::VerticalRoller, Condition::FreeSlip,
             ][wall as usize];
-            let walls = (&model.outline, Walls::shaken(&model.outline, base, [false; 2]));
-            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], walls, None);
+            let edges = EdgesView { outline: &model.outline, walls: Walls::shaken(&model.outline, base, [false; 2]) };
+            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], edges, None);
             let velocity: Vec<Vec2> = v.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
             let points: Vec<StressPoint> = normal.iter().zip(&shear).map(|(n, s)| StressPoint {
                 stress: Stress { xx: n.0, yy: n.1, xy: s.0, zz: 0.0 },
                 density: 1.0,
                 volume: 0.5,
-                // Any deformation will do, so long as it does not turn the soil inside out.
+                // Any deformation with a positive volume ratio.
                 deformation: Deformation::default().moved(
                     Vec2::new(strain * s.1, -strain * n.0) / 9.0, Vec2::new(strain * n.1, strain * s.0) / 9.0,
                 ),
@@ -270,7 +275,7 @@ pub(crate) mod tests {
                 let linear: Vec2 = force.iter().sum();
                 let angular: f64 = force.iter().zip(&model.position).map(|(f, x)| x.x * f.y - x.y * f.x).sum();
                 prop_assert!(linear.norm() < 1e-11, "{}", linear);
-                // The nodes stand where they were, so only without deformation does the moment mean anything.
+                // The nodes do not move with the deformation, so the moment is meaningful only without it.
                 prop_assert!(strain > 0.0 || angular.abs() < 1e-10, "{}", angular);
             }
         }
@@ -282,8 +287,8 @@ pub(crate) mod tests {
         ) {
             let period = periodic.then_some(Period { width: COLUMNS as f64 });
             let model = disordered(&disorder, period);
-            let walls = (&model.outline, Walls::statics(&model.outline));
-            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], walls, None);
+            let edges = EdgesView::statics(&model.outline);
+            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], edges, None);
             let points = vec![StressPoint { shear_modulus: 1e4, density: 1.0, volume: 0.5, ..StressPoint::default() }; STRESS_NODES * NODES];
             let rough: Vec<Vec2> = v.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
             let force = forces(&geometry, &points, &rough, 0.1);

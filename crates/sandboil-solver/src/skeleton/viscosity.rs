@@ -1,5 +1,6 @@
-//! Artificial viscosity of Monaghan (1983, J. Comput. Phys. 52, 374-389): brakes nodes that approach each other, so that
-//! they do not pair up. The forces act along the line between two nodes, keep both momenta and only take energy.
+//! Artificial viscosity of Monaghan (1983, J. Comput. Phys. 52, 374-389): slows nodes that approach each
+//! other, so that they do not form pairs. The forces act along the line between two nodes, conserve linear
+//! and angular momentum, and only take energy.
 
 use crate::{
     parallel::{Rows, chunks, for_each_chunk},
@@ -9,8 +10,21 @@ use crate::{
 };
 use sandboil_sph::{Vec2, WendlandQuintic};
 
-/// Keeps the approach of two nodes that meet finite, in squares of the smoothing length (Monaghan 1983).
+/// Softening of the squared distance, over the squared smoothing length: the force stays finite when two
+/// nodes meet (Monaghan 1983).
 pub const SOFTENING: f64 = 0.01;
+
+/// The present motion of all nodes.
+#[derive(Clone, Copy)]
+pub struct MovingNodes<'a> {
+    /// Positions, m.
+    pub position: &'a [Vec2],
+    /// Velocities, m/s.
+    pub velocity: &'a [Vec2],
+    /// Volumes per unit thickness, m2.
+    pub volume: &'a [f64],
+}
+
 /// Viscous forces of the present motion.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Viscosity {
@@ -19,7 +33,7 @@ pub struct Viscosity {
 }
 
 impl Viscosity {
-    /// None yet.
+    /// No forces yet.
     pub fn new(coefficient: f64, nodes: usize) -> Self {
         Self { coefficient, force: vec![Vec2::zeros(); nodes] }
     }
@@ -40,18 +54,19 @@ impl Viscosity {
         self.force[j]
     }
 
-    /// Gathers the forces of all nodes at `position` (m) moving at `velocity` (m/s), with volumes in m2.
+    /// Gathers the forces on all nodes.
     pub fn update(
         &mut self,
         threaded: bool,
-        (model, geometry): (&Model, &Geometry),
+        model: &Model,
+        geometry: &Geometry,
         points: &[StressPoint],
-        (position, velocity, volume): (&[Vec2], &[Vec2], &[f64]),
+        MovingNodes { position, velocity, volume }: MovingNodes,
     ) {
         let kernel = WendlandQuintic::new(model.smoothing_length());
         let h = kernel.smoothing_length();
         let least = SOFTENING * h * h;
-        // Of the skeleton: water does not make it more viscous.
+        // Impedance of the skeleton alone: water adds no viscosity.
         let impedance = |node: usize| {
             let point = &points[STRESS_NODES * node];
             (point.stiffness * point.density).sqrt()
@@ -83,13 +98,14 @@ impl Viscosity {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{section::outline::Walls, testing::square_block};
+    use crate::{section::outline::EdgesView, testing::square_block};
     use proptest::prelude::*;
 
     const SIDE: usize = 5;
 
     proptest! {
-        /// Viscous forces keep both momenta, take energy and never give any, and leave alone what parts.
+        /// Viscous forces conserve linear and angular momentum, only take energy, and are zero between nodes
+        /// that move apart.
         #[test]
         fn viscosity_only_takes_energy(
             places in prop::collection::vec((-0.3_f64..0.3, -0.3_f64..0.3), SIDE * SIDE),
@@ -101,12 +117,13 @@ mod tests {
             }
             let velocity: Vec<Vec2> = velocities.into_iter().map(|(x, y)| Vec2::new(x, y)).collect();
             let volume = vec![1.0; SIDE * SIDE];
-            let edges = (&model.outline, Walls::statics(&model.outline));
+            let edges = EdgesView::statics(&model.outline);
             let geometry = Geometry::build(&model, &model.position, &volume, edges, None);
             let points = vec![StressPoint { stiffness: 4.0, density: 1.0, ..StressPoint::default() }; 2 * SIDE * SIDE];
             let mut viscosity = Viscosity::new(0.1, SIDE * SIDE);
             let mut forces = |velocity: &[Vec2]| {
-                viscosity.update(false, (&model, &geometry), &points, (&model.position, velocity, &volume));
+                let nodes = MovingNodes { position: &model.position, velocity, volume: &volume };
+                viscosity.update(false, &model, &geometry, &points, nodes);
                 viscosity.force.clone()
             };
             let force = forces(&velocity);
