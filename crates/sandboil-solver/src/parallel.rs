@@ -5,19 +5,20 @@ use crate::error::SolverError;
 use rayon::{ThreadPool, ThreadPoolBuilder, prelude::*};
 use std::{mem, process};
 
-/// Rows per chunk. Small enough to balance liquefied against elastic soil between threads, large enough that
-/// handing a chunk over (about a microsecond) stays below a tenth of its work.
+/// Rows per chunk. Small enough to balance the work of liquefied and elastic soil between threads, and large
+/// enough that the overhead of a chunk (about a microsecond) is less than a tenth of its work.
 pub const CHUNK: usize = 32;
 
-/// Domains below this many rows run on the calling thread: a barrier would cost more than it shares out.
+/// Domains below this many rows run on the calling thread: synchronising threads would cost more than it
+/// gains.
 pub const FEWEST_THREADED_ROWS: usize = 256;
 
-/// The threads of one simulation, and of no other; none where the calling thread does all.
+/// The threads of one simulation; `None` if the calling thread does all work.
 #[derive(Debug, Default)]
 pub struct Pool(Option<Threads>);
 
 impl Pool {
-    /// So many threads; one needs no pool.
+    /// A pool of `threads` threads; one thread needs no pool.
     ///
     /// # Errors
     /// [`SolverError::Threads`] if they cannot be started.
@@ -25,9 +26,9 @@ impl Pool {
         Ok(Self((threads > 1).then(|| Threads::start(threads)).transpose()?))
     }
 
-    /// Does work whose loops are shared out among the threads.
+    /// Does work whose loops are shared among the threads.
     ///
-    /// A process that was forked has none of the threads of the one before: it starts its own.
+    /// A forked process does not have the threads of its parent: it starts new ones.
     ///
     /// # Errors
     /// [`SolverError::Threads`] if they cannot be started.
@@ -43,14 +44,14 @@ impl Pool {
 
 impl Drop for Pool {
     fn drop(&mut self) {
-        // Threads of another process cannot be told to end, and their locks may be held for ever.
+        // Threads of another process cannot be stopped, and waiting for their locks may never end.
         if let Some(threads) = self.0.take_if(|threads| threads.process != process::id()) {
             mem::forget(threads);
         }
     }
 }
 
-/// Threads, and the process that they live in.
+/// Threads, and the process in which they run.
 #[derive(Debug)]
 struct Threads {
     pool: ThreadPool,
@@ -70,7 +71,8 @@ pub fn chunks(rows: usize) -> usize {
     rows.div_ceil(CHUNK)
 }
 
-/// Up to three row-wise arrays that a loop writes together; unit slices stand for the ones it does not need.
+/// Up to three row-wise arrays that a loop writes together. A slice of units takes the place of an array that
+/// it does not need.
 pub struct Rows<'a, A, B = (), C = ()> {
     /// First array.
     pub a: &'a mut [A],

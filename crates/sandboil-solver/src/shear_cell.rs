@@ -1,10 +1,11 @@
-//! The paper's cyclic direct simple shear test (Section 6.1, Fig. 3a): a block whose outer nodes move as Eq. 17 says
-//! and whose centre moves freely under the momentum equation, at constant volume.
+//! The paper's cyclic direct simple shear test (Section 6.1, Fig. 3a): a block whose outer nodes move by Eq.
+//! 17 and whose centre moves freely by the momentum equation, at constant volume.
 //!
-//! Eq. 17 is taken in the frame of the block's centre: a rigid translation strains nothing, and without it the centre
-//! need not be carried along. The drive is a servo. A velocity that jumped, as the paper reverses it, would send
-//! shear waves `rho C_s dv` into the centre; here the strain rate changes so slowly that the centre's inertia takes
-//! only a set share of the confining stress, and it brakes before each reversal. So velocities need no resetting.
+//! Eq. 17 is taken in the frame of the block's centre: a rigid translation causes no strain, and without it
+//! the centre stays in place. A servo controls the strain rate. A sudden reversal of the velocity, as in the
+//! paper, would send shear waves `rho C_s dv` into the centre. Here the strain rate changes so slowly that
+//! the inertia of the centre takes only a given share of the confining stress, and it decreases before each
+//! reversal. Velocities therefore need no reset.
 
 use crate::{
     error::SolverError,
@@ -16,7 +17,7 @@ use crate::{
     },
     section::{
         description::{Conductivity, Model, Numerics, Region, STRESS_NODES, positive},
-        outline::{Outline, Walls},
+        outline::{EdgesView, Outline},
     },
     skeleton::{
         local_damping::local_damping,
@@ -33,19 +34,19 @@ use sandboil_soil::{
 };
 use sandboil_sph::{Vec2, WendlandQuintic};
 
-/// Stress that a reversal may pass its target by, over the target.
+/// Overshoot of the shear stress that is allowed at a reversal, over the target.
 const OVERSHOOT: f64 = 1e-3;
 /// Shear strain over which the tangent stiffness is averaged.
 const TANGENT_WINDOW: f64 = 1e-4;
-/// Least confining stress the drive reckons with, over the initial vertical stress: liquefied soil still has to be
-/// moved.
+/// Least confining stress that the servo assumes, over the initial vertical stress: liquefied soil must still
+/// be moved.
 const LEAST_CONFINEMENT: f64 = 0.005;
-/// Gravity, m/s2: the block has no weight, but a model must name one.
+/// Gravity, m/s2: the block has no weight, but a model needs a value.
 const STANDARD_GRAVITY: f64 = 9.81;
-/// Least tangent stiffness the drive reckons with, over the elastic one: sand that flows is about to dilate, and then
-/// hardens by up to 0.06 of it.
+/// Least tangent stiffness that the servo assumes, over the elastic one: liquefied sand is about to dilate,
+/// and its tangent then becomes up to 0.06 of the elastic one.
 const LEAST_TANGENT: f64 = 0.1;
-/// What is tested, and how.
+/// Description of a test.
 #[derive(Debug, Clone)]
 pub struct CellTest {
     /// The soil.
@@ -74,18 +75,18 @@ pub struct CellTest {
     pub local_damping: f64,
     /// The test ends when the shear strain reaches this.
     pub strain_limit: f64,
-    /// The test ends after so many turns.
+    /// The test ends after this number of turns.
     pub turn_limit: usize,
-    /// Changes that are worth a line of the record.
+    /// Changes after which a row is recorded.
     pub resolution: Resolution,
-    /// Whether stress nodes that no free node feels are computed too.
+    /// Whether stress nodes that do not act on free nodes are computed too.
     pub every_stress_node: bool,
     /// Numerical choices.
     pub numerics: Numerics,
 }
 
 impl CellTest {
-    /// Checks what [`Model::validate`] does not see.
+    /// Checks the values that [`Model::validate`] does not check.
     fn validate(&self) -> Result<(), SolverError> {
         positive("density", self.density)?;
         positive("vertical_stress", self.vertical_stress)?;
@@ -103,8 +104,9 @@ impl CellTest {
             let (name, value) = ("local_damping", self.local_damping);
             return Err(SolverError::InvalidInput { name, value, expected: "in [0, 1)" });
         }
-        // No force on a free node may know of the block's end, where stencils are cut: a uniform stress would move
-        // it. Two supports lie between the node and the first one missing, a spacing beyond the last.
+        // Forces on free nodes must not depend on the ends of the block, where stencils are cut: a uniform
+        // stress would move the nodes. Two supports must fit between a free node and the first missing node,
+        // a spacing beyond the last one.
         let support = WendlandQuintic::new(self.numerics.smoothing_ratio * self.spacing).support();
         if !(0.5 * (self.size - self.free_size) + self.spacing >= 2.0 * support) {
             return Err(SolverError::InvalidInput {
@@ -116,8 +118,9 @@ impl CellTest {
         Ok(())
     }
 
-    /// The block, its nodes sorted: free ones first, then by the distance of their nearer stress node from these, so
-    /// that those whose stress is felt stand in front; the lattice index of each, and how many are free.
+    /// The block with sorted nodes, the lattice index of each, and the number of free nodes. Free nodes are
+    /// first; the others are sorted by the distance of their nearer stress node from the free centre, so that
+    /// those whose stress acts on free nodes come next.
     fn model(&self) -> Result<(Model, Vec<usize>, usize), SolverError> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // validated: a few hundred at most
         let side = (self.size / self.spacing).round() as usize;
@@ -147,7 +150,7 @@ impl CellTest {
             position: order.iter().map(|&k| lattice[k]).collect(),
             volume: vec![self.spacing * self.spacing; nodes],
             region: vec![0; nodes],
-            // Without pores the mixture has the density given.
+            // Without pores the mixture has the given density.
             regions: vec![Region {
                 soil: self.soil.clone(),
                 porosity: 0.0,
@@ -178,7 +181,7 @@ impl CellTest {
     }
 }
 
-/// The first nodes of a model, for what looks at nodes alone.
+/// A model of the first nodes alone.
 fn first_nodes(model: &Model, nodes: usize) -> Model {
     Model {
         position: model.position[..nodes].to_vec(),
@@ -190,7 +193,7 @@ fn first_nodes(model: &Model, nodes: usize) -> Model {
     }
 }
 
-/// How far the centre is from homogeneous shear up to the target.
+/// Departure of the centre from homogeneous shear up to the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Departure {
     /// Standard deviation of the shear strain.
@@ -221,7 +224,7 @@ impl Departure {
         overshoot: -1.0,
     };
 
-    /// The larger of each.
+    /// The larger value of each field.
     fn or_larger(self, other: Self) -> Self {
         Self {
             gamma_spread: self.gamma_spread.max(other.gamma_spread),
@@ -235,16 +238,16 @@ impl Departure {
     }
 }
 
-/// The drive: shear-strain rate of Eq. 17, `v_x0 / H`, and the target it runs towards.
+/// Control of the shear-strain rate of Eq. 17, `v_x0 / H`, towards a target stress.
 #[derive(Debug, Clone)]
 struct Servo {
     /// Shear stress of reversal, kPa.
     target: f64,
-    /// Sense of the present loading.
+    /// Sign of the present loading.
     direction: f64,
     /// Turns made.
     turns: usize,
-    /// Shear stress at the last one, kPa.
+    /// Shear stress at the last turn, kPa.
     from: f64,
     /// Shear-strain rate, 1/s.
     rate: f64,
@@ -253,11 +256,12 @@ struct Servo {
 }
 
 impl Servo {
-    /// Rate of the next step, 1/s, when the centre carries `tau` (kPa) and the rate may change by `acceleration`
-    /// (1/s2) and not exceed `fastest` (1/s).
+    /// Rate of the next step, 1/s, at the shear stress `tau` (kPa). The rate may change by `acceleration`
+    /// (1/s2) and must not exceed `fastest` (1/s).
     ///
-    /// A rate `r` that is braked by `a` covers `r^2 / (2 a)`, so that under the present tangent stress grows by
-    /// `G_t r^2 / (2 a)` on the way to rest: that much must be left. The overshoot allowed keeps it from stalling.
+    /// A rate `r` that decreases by `a` covers the strain `r^2 / (2 a)` before it is zero. With the present
+    /// tangent, stress grows by `G_t r^2 / (2 a)` in this time: so much must be left to the target. The
+    /// allowed overshoot keeps the rate from becoming zero before the target.
     fn next_rate(&self, tau: f64, acceleration: f64, fastest: f64, dt: f64) -> f64 {
         let left = (self.target - self.direction * tau).max(0.0) + OVERSHOOT * self.target;
         let wanted = self.direction * (2.0 * acceleration * left / self.tangent).sqrt().min(fastest);
@@ -265,9 +269,9 @@ impl Servo {
         self.rate + (wanted - self.rate).clamp(-change, change)
     }
 
-    /// Takes in a step's change of strain and stress; `shear_modulus` (kPa) bounds the tangent. Returns whether the
-    /// direction reversed.
-    fn follow(&mut self, strain: f64, (before, now): (f64, f64), shear_modulus: f64) -> bool {
+    /// Tracks the tangent and the target with the strain of a step and the shear stresses `before` and `now`
+    /// (kPa); `shear_modulus` (kPa) bounds the tangent. Returns whether the direction reversed.
+    fn track(&mut self, strain: f64, before: f64, now: f64, shear_modulus: f64) -> bool {
         let weight = (strain.abs() / TANGENT_WINDOW).min(1.0);
         if weight > 0.0 {
             self.tangent += weight * ((now - before) / strain - self.tangent);
@@ -283,17 +287,17 @@ impl Servo {
         reversed
     }
 
-    /// Cycles so far when the centre carries `tau`, kPa.
+    /// Cycles so far at the shear stress `tau`, kPa.
     fn cycle(&self, tau: f64) -> f64 {
         cycles(self.turns, (self.from, self.direction * self.target), tau)
     }
 }
 
-/// A shear test under way. Arrays that leave are in lattice order, row by row from the bottom.
+/// A running shear test. Output arrays are in lattice order, row by row from the bottom.
 #[derive(Debug)]
 pub struct ShearCell {
     test: CellTest,
-    /// Nodes sorted: free ones first, then by their distance from these.
+    /// The block with sorted nodes: free ones first, then by the distance from the free centre.
     model: Model,
     /// Lattice index of each node.
     order: Vec<usize>,
@@ -302,7 +306,7 @@ pub struct ShearCell {
     geometry: Geometry,
     position: Vec<Vec2>,
     velocity: Vec<Vec2>,
-    /// Points and shares of the stress nodes that are computed.
+    /// Stress nodes that are computed, and their shares.
     points: Vec<StressPoint>,
     shares: Vec<NodalShare>,
     soil: SoilField,
@@ -328,8 +332,8 @@ impl ShearCell {
         test.validate()?;
         let (model, order, free) = test.model()?;
         let nodes = model.nodes();
-        let walls = (&model.outline, Walls::statics(&model.outline));
-        let geometry = Geometry::build(&model, &model.position, &model.volume, walls, None);
+        let edges = EdgesView::statics(&model.outline);
+        let geometry = Geometry::build(&model, &model.position, &model.volume, edges, None);
         let reached = |j: usize| geometry.gradient.transposed.iter_row(j).map(|(s, _)| s / STRESS_NODES + 1);
         let computed =
             if test.every_stress_node { nodes } else { (0..free).flat_map(reached).max().unwrap_or(free) };
@@ -386,7 +390,7 @@ impl ShearCell {
         Ok(cell)
     }
 
-    /// Time step at the safe share of the limit of the present stiffness, s.
+    /// Time step with the safety factor of moving ground, for the present stiffness, s.
     fn limit(&self) -> f64 {
         let stiffest = self.points.iter().map(|point| point.stiffness).fold(0.0, f64::max);
         let limits = Limits {
@@ -430,8 +434,8 @@ impl ShearCell {
         gamma.abs() >= self.test.strain_limit || self.servo.turns >= self.test.turn_limit
     }
 
-    /// Largest change of the shear-strain rate, 1/s2. The centre, held by shear stress on its edges, departs from a
-    /// uniform stress by at most `rho a L^2 / 8` in its middle.
+    /// Largest change of the shear-strain rate, 1/s2. Inertia changes the shear stress in the middle of the
+    /// centre by at most `rho a L^2 / 8`.
     fn acceleration_limit(&self) -> f64 {
         let confinement = -0.5 * (self.now.stress.xx + self.now.stress.yy);
         let confinement = confinement.max(LEAST_CONFINEMENT * self.test.vertical_stress);
@@ -472,7 +476,7 @@ impl ShearCell {
         let before = self.now.stress.xy;
         self.now = self.means();
         let tau = self.now.stress.xy;
-        let turned = self.servo.follow(rate * dt, (before, tau), self.points[0].shear_modulus);
+        let turned = self.servo.track(rate * dt, before, tau, self.points[0].shear_modulus);
         self.now.cycle = self.servo.cycle(tau);
         self.now.turns = self.servo.turns;
         self.largest = self.largest.or_larger(self.departure());
@@ -487,11 +491,11 @@ impl ShearCell {
         Ok(())
     }
 
-    /// Velocities of the free nodes, moved by the force of the stress around them (Eq. 6).
+    /// Updates the velocities of the free nodes by the force of the stress around them (Eq. 6).
     fn accelerate(&mut self, dt: f64) {
         let Self { velocity, geometry, shares, points, .. } = self;
         let (mass, damping) = (self.mass, self.test.local_damping);
-        // Arrays of units take no memory.
+        // Arrays of units have no size.
         let (mut b, mut c, mut results) =
             (vec![(); self.free], vec![(); self.free], vec![(); chunks(self.free)]);
         let rows = Rows { a: &mut velocity[..self.free], b: &mut b, c: &mut c };
@@ -503,7 +507,7 @@ impl ShearCell {
         });
     }
 
-    /// Means over the centre's stress nodes, in their order; cycles and turns as they were.
+    /// Means over the centre's stress nodes, in their order, with unchanged cycles and turns.
     fn means(&self) -> Row {
         let count = STRESS_NODES * self.free;
         let mut strain = [0.0; 3];
@@ -528,7 +532,7 @@ impl ShearCell {
         }
     }
 
-    /// How far the centre is from homogeneous shear now.
+    /// Present departure of the centre from homogeneous shear.
     pub fn departure(&self) -> Departure {
         let Row { strain, stress, .. } = self.now;
         let centre = &self.points[..STRESS_NODES * self.free];
@@ -553,7 +557,7 @@ impl ShearCell {
         }
     }
 
-    /// Finiteness and stability limit, every few steps.
+    /// Checks finiteness and stability limit, every few steps.
     fn check(&mut self) -> Result<(), SolverError> {
         for (j, v) in self.velocity[..self.free].iter().enumerate() {
             let speed = v.norm();
@@ -576,7 +580,7 @@ impl ShearCell {
         SolverError::Diverged { quantity, node, x, y, value, time, step }
     }
 
-    /// Means over the centre after the steps that were worth a line, strain tension positive.
+    /// Recorded means over the centre; strain tension positive.
     pub fn record(&self) -> &Record {
         &self.record
     }
@@ -601,7 +605,7 @@ impl ShearCell {
         self.dt
     }
 
-    /// Work done so far.
+    /// Counts of the work done so far.
     pub fn counters(&self) -> Counters {
         self.counters
     }

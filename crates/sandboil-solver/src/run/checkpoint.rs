@@ -1,29 +1,29 @@
-//! A simulation as bytes. All that a step reads is stored as it is, the weight tables included, so that nothing has to
-//! be rebuilt to the last bit.
+//! A simulation as bytes. Everything that a step reads is stored, the weight tables included, so that a
+//! restored simulation continues with the same bits.
 //!
 //! ```text
 //! magic             8 bytes
 //! format version    u32
 //! build             u32, of the sources that wrote it
 //! length of note    u64
-//! note              whatever the caller wants to find again
+//! note              bytes of the caller
 //! simulation        postcard
-//! checksum          u32, CRC-32 of all before
+//! checksum          u32, CRC-32 of all bytes before it
 //! ```
 //!
-//! Numbers are little endian. The layout of a simulation is that of its types, which change with the sources: bytes of
-//! another build are refused rather than misread.
+//! Numbers are little endian. The layout of a simulation is that of its types, which change with the sources:
+//! bytes of another build are refused, not misread.
 
 use crate::error::StateError;
 use crc32fast::Hasher;
 use serde::{Serialize, de::DeserializeOwned};
 use std::io::{self, Write};
 
-/// What the bytes of every state begin with.
+/// The first bytes of every stored state.
 pub const MAGIC: &[u8] = b"SANDBOIL";
-/// Raised when what stands around a simulation changes.
+/// Increased when the layout around the simulation changes.
 const FORMAT_VERSION: u32 = 1;
-/// Sums up what passes through, and keeps the error that postcard would lose.
+/// A writer that computes the checksum of its bytes, and keeps an error that postcard would lose.
 struct Summed<W> {
     to: W,
     sum: Hasher,
@@ -31,7 +31,7 @@ struct Summed<W> {
 }
 
 impl<W> Summed<W> {
-    fn kept<T>(&mut self, outcome: io::Result<T>) -> io::Result<T> {
+    fn keep_error<T>(&mut self, outcome: io::Result<T>) -> io::Result<T> {
         outcome.map_err(|error| {
             let kind = error.kind();
             self.failure = Some(error);
@@ -43,18 +43,18 @@ impl<W> Summed<W> {
 impl<W: Write> Write for Summed<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let outcome = self.to.write(bytes);
-        let taken = self.kept(outcome)?;
+        let taken = self.keep_error(outcome)?;
         self.sum.update(&bytes[..taken]);
         Ok(taken)
     }
 
     fn flush(&mut self) -> io::Result<()> {
         let outcome = self.to.flush();
-        self.kept(outcome)
+        self.keep_error(outcome)
     }
 }
 
-/// What distinguishes the sources that this program was built from.
+/// Checksum of the sources from which this program was built.
 const BUILD: [u8; 4] = match u32::from_str_radix(env!("SANDBOIL_SOURCES"), 16) {
     Ok(sum) => sum.to_le_bytes(),
     Err(_) => panic!("the build script gives a number in base 16"),
@@ -63,7 +63,7 @@ const BUILD: [u8; 4] = match u32::from_str_radix(env!("SANDBOIL_SOURCES"), 16) {
 /// Writes a state and a note.
 ///
 /// # Errors
-/// Those of `to`.
+/// Errors of the writer `to`.
 pub fn write(state: &impl Serialize, note: &[u8], to: impl Write) -> io::Result<()> {
     let mut to = Summed { to, sum: Hasher::new(), failure: None };
     let outcome = write_summed(state, note, &mut to);
@@ -80,7 +80,7 @@ fn write_summed(state: &impl Serialize, note: &[u8], to: &mut impl Write) -> io:
     postcard::to_io(state, to).map(|_| ()).map_err(io::Error::other)
 }
 
-/// What stands in the bytes of a state.
+/// The parts of a stored state.
 struct Parts<'a> {
     build: [u8; 4],
     note: &'a [u8],
@@ -107,18 +107,18 @@ fn parts(bytes: &[u8]) -> Result<Parts<'_>, StateError> {
     Ok(Parts { build: *build, note, state })
 }
 
-/// The note that was stored with a state, which may be that of another build.
+/// The note that was stored with a state, also by another build.
 ///
 /// # Errors
-/// Bytes that are no state, of another format version or damaged.
+/// Bytes that are not a state, of another format version or damaged.
 pub fn note(bytes: &[u8]) -> Result<&[u8], StateError> {
     Ok(parts(bytes)?.note)
 }
 
-/// The state.
+/// The state, read from its bytes.
 ///
 /// # Errors
-/// Bytes that are no state, of another format version or build, or damaged.
+/// Bytes that are not a state, of another format version or build, or damaged.
 pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, StateError> {
     let Parts { build: found, state, .. } = parts(bytes)?;
     if found != BUILD {
@@ -126,7 +126,7 @@ pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, StateError> {
     }
     match postcard::take_from_bytes(state) {
         Ok((state, [])) => Ok(state),
-        _ => Err(StateError::Damaged("it does not say what a simulation does")),
+        _ => Err(StateError::Damaged("its content is not a simulation")),
     }
 }
 
@@ -134,7 +134,7 @@ pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, StateError> {
 mod tests {
     use super::*;
 
-    /// Takes so many bytes, then fails.
+    /// A writer that takes `room` bytes, then fails.
     struct Full {
         room: usize,
         flushes: bool,
@@ -156,16 +156,16 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_is_told_in_the_words_of_the_writer() {
+    fn write_errors_are_those_of_the_writer() {
         let state = vec![1.0_f64; 100];
         let mut whole = Vec::new();
         write(&state, b"note", &mut whole).unwrap();
         assert_eq!(read::<Vec<f64>>(&whole), Ok(state.clone()));
         for room in 0..whole.len() {
-            let told = write(&state, b"note", Full { room, flushes: true }).unwrap_err().to_string();
-            assert_eq!(told, "full", "{room}");
+            let message = write(&state, b"note", Full { room, flushes: true }).unwrap_err().to_string();
+            assert_eq!(message, "full", "{room}");
         }
-        let told = write(&state, b"note", Full { room: whole.len(), flushes: false }).unwrap_err();
-        assert_eq!(told.to_string(), "cannot flush");
+        let message = write(&state, b"note", Full { room: whole.len(), flushes: false }).unwrap_err();
+        assert_eq!(message.to_string(), "cannot flush");
     }
 }

@@ -5,7 +5,8 @@ use sandboil_soil::UpdateReport;
 
 /// Steps between checks of stability limit, geometry and finiteness.
 pub const CHECK_INTERVAL: u64 = 16;
-/// The step shrinks when it exceeds its target by this factor, and grows when it falls below by [`GROW_AT`].
+/// The time step is reduced when it exceeds its target by this factor, and increased when it is below by
+/// [`GROW_AT`].
 const SHRINK_AT: f64 = 1.1;
 /// See [`SHRINK_AT`].
 const GROW_AT: f64 = 1.3;
@@ -35,8 +36,8 @@ impl Clock {
         self.time += self.dt;
     }
 
-    /// Takes over a new limit if the time step is too far from it. Returns whether it did.
-    pub fn follow(&mut self, limit: TimeLimit) -> bool {
+    /// Sets the time step to a new limit if it is too far from it. Returns whether it changed.
+    pub fn update(&mut self, limit: TimeLimit) -> bool {
         let outgrown = is_outgrown(self.dt, limit.dt);
         if outgrown {
             (self.dt, self.criterion) = (limit.dt, limit.criterion);
@@ -50,7 +51,7 @@ pub fn is_outgrown(dt: f64, target: f64) -> bool {
     dt > SHRINK_AT * target || dt * GROW_AT < target
 }
 
-/// Work done in a stage, by kind: what a scene does not ask for stays zero.
+/// Counts of the work done in a stage, by kind; kinds that a scene does not need stay zero.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Counters {
     /// Steps.
@@ -67,9 +68,9 @@ pub struct Counters {
     pub plastic_updates: u64,
     /// Geometries built.
     pub geometry_builds: u64,
-    /// Porosities kept in the range of a grain packing.
+    /// Porosities clipped to the range of a grain packing.
     pub porosity_clips: u64,
-    /// Stress nodes that began with a stress their soil cannot carry, and took the nearest that it can.
+    /// Stress nodes whose soil could not carry their initial stress and took the nearest that it can carry.
     pub inadmissible_starts: u64,
     /// Changes of the time step.
     pub time_step_changes: u64,

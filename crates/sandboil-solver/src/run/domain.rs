@@ -1,4 +1,4 @@
-//! The ground with what acts on it: forces, accelerations, stress, and the limit of the time step.
+//! The ground and the parts of its steps: forces, accelerations, stress, and the limit of the time step.
 
 use crate::{
     error::SolverError,
@@ -11,7 +11,7 @@ use crate::{
     },
     section::{
         description::{Model, STRESS_NODES},
-        outline::Walls,
+        outline::{EdgesView, Walls},
     },
     skeleton::{
         contacts::Contacts,
@@ -21,7 +21,7 @@ use crate::{
         rayleigh::{Rayleigh, RayleighDamping},
         soils::{StrainStep, StressRows, StressWork},
         strain_and_force::{NodalShare, motion},
-        viscosity::Viscosity,
+        viscosity::{MovingNodes, Viscosity},
     },
     water::still_water::suction_and_pressure,
     weights::{
@@ -32,7 +32,7 @@ use crate::{
 use sandboil_soil::Stress;
 use sandboil_sph::Vec2;
 
-/// Speed that no soil particle reaches, m/s: a run that does has diverged.
+/// Speed that no soil particle reaches, m/s: a run that reaches it has diverged.
 pub const RUNAWAY_SPEED: f64 = 1e3;
 
 /// Damping of a stage.
@@ -46,29 +46,30 @@ pub struct ActiveDamping {
     pub viscosity: Option<Viscosity>,
 }
 
-/// Inertia corrected for dispersion, with the contacts of soils that it needs to see sharply.
+/// Inertia corrected for dispersion, with the sharp contacts of soils that it needs.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct CorrectedInertia {
     /// The correction.
     pub dispersion: Dispersion,
-    /// The contacts, from the stiffness when the ground was let go.
+    /// The contacts, from the stiffness when shaking began.
     pub contacts: Option<Contacts>,
 }
 
-/// Arrays that every step fills. A state holds them, since the next step reads them.
+/// Arrays that every step fills. They are part of a stored state, because the next step reads them.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Workspace {
     /// Share of every stress node in the nodal forces.
     pub shares: Vec<NodalShare>,
     /// Force of the pore water in the last step, kN/m.
     pub water_force: Vec<Vec2>,
-    /// Stresses of the printed operators, with these.
+    /// Stresses of the printed operators, if these are chosen.
     pub printed: Option<PrintedStress>,
     /// Sums over the chunks of nodes.
     sums: Vec<MotionSum>,
 }
 
-/// Sums over nodes of the velocity update: of statics how far from rest they are, of moving ground the power of forces.
+/// Sums over the nodes in the velocity update: in statics to decide whether they are at rest, in moving
+/// ground the power of forces.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub struct MotionSum {
     /// Kinetic energy, kJ/m.
@@ -135,12 +136,12 @@ impl Domain {
         Ok(domain)
     }
 
-    /// Time step at `factor` of the limit of the present stiffness, s.
+    /// Time step at `factor` times the limit for the present stiffness, s.
     pub fn limit(&self, coupling: PressureCoupling, factor: f64) -> TimeLimit {
         self.limit_under(self.damping.rayleigh.as_ref().map(RayleighDamping::law), coupling, factor)
     }
 
-    /// The same under another Rayleigh damping than the stage's.
+    /// The same with another Rayleigh damping than that of the stage.
     pub fn limit_under(
         &self,
         rayleigh: Option<&Rayleigh>,
@@ -156,7 +157,7 @@ impl Domain {
             viscosity: self.damping.viscosity.as_ref().map_or(0.0, Viscosity::coefficient),
             surface_is_tied: free_surface.is_none(),
         };
-        // Nodes are sorted by region: each is one stretch.
+        // Nodes are sorted by region, so that each region is contiguous.
         let mut first = 0;
         let TimeLimit { dt, criterion } = model
             .region
@@ -230,7 +231,7 @@ impl Domain {
         self.refresh_shares(&vec![Vec2::zeros(); self.ground.nodes()]);
     }
 
-    /// Makes weight and still water act where the nodes are, and nothing else.
+    /// Sets the constant forces to weight and still water at the present positions.
     pub fn set_present_forces(&mut self) {
         let Ground { model, water, position, phases, .. } = &self.ground;
         let volume = phases.volume();
@@ -250,9 +251,9 @@ impl Domain {
         self.forces.set_present(&self.ground.mass, self.ground.model.gravity, &parts);
     }
 
-    /// Force of suction (kPa, negative) on every node, kN/m. Water under pressure continues as a pond beyond the ground
-    /// surface, so that its gradient is all its force; suction ends there, and draws the surface to the ground: it acts
-    /// as the stress that it is a part of, which no traction meets at the surface.
+    /// Force of suction (kPa, negative) on every node, kN/m. Water under pressure continues in a pond above
+    /// the ground surface, so its force is that of its gradient. Suction ends at the surface and pulls it
+    /// towards the ground: it acts like a part of the stress, without a traction at the surface.
     fn suction_force(&mut self, suction: &[f64]) -> Vec<Vec2> {
         let Ground { model, position, points, .. } = &mut self.ground;
         let places = stress_node_positions(position, model.spacing);
@@ -269,14 +270,14 @@ impl Domain {
         force
     }
 
-    /// Makes the present state one of rest: constant forces balance stress and pressure.
+    /// Sets the constant forces that balance stress and pressure: the present state is then at rest.
     pub fn balance(&mut self) {
         let force = self.static_force();
         self.forces.balance(&force);
     }
 
-    /// Makes the present excess pressure one that a constant load holds. The load also acts on the nodes tied to the
-    /// surface, whose pressure drains at once.
+    /// Sets the constant load that balances the present excess pressure. The load also acts on the nodes tied
+    /// to the surface, whose pressure drains at once.
     pub fn balance_under_load(&mut self) {
         let force = self.static_force();
         let Ground { water, geometry, .. } = &self.ground;
@@ -287,8 +288,8 @@ impl Domain {
         self.forces.balance_under_load(&force, held_back);
     }
 
-    /// Forces and accelerations, and velocities changed by them over `dt`; positions stay. Returns what is needed of the
-    /// motion in statics or else.
+    /// Computes forces and accelerations, and changes the velocities over `dt`; positions do not change.
+    /// Returns the sums that statics or moving ground need.
     pub fn accelerate<const STATICS: bool>(&mut self, dt: f64) -> MotionSum {
         self.prepare_printed_stress();
         let threaded = self.threaded;
@@ -307,7 +308,7 @@ impl Domain {
             rayleigh: damping.rayleigh.as_ref(),
             viscosity: damping.viscosity.as_ref(),
         };
-        // The constant force comes last, so that a state at rest cancels to the last bit.
+        // The constant force is added last, so that the sum at rest is zero to the last bit.
         let bare = |j: usize, velocity: Vec2, water: &mut Vec2, sum: &mut MotionSum| {
             let last_water = *water;
             *water = forces.of_water(j);
@@ -334,7 +335,7 @@ impl Domain {
         let dispersion = dispersion.as_deref();
         let rows = Rows { a: &mut velocity[..nodes], b: &mut acceleration[..nodes], c: water_force };
         for_each_chunk(threaded, rows, sums, |first, rows, chunk| {
-            // In registers: memory that the loop may write elsewhere would be read back every time.
+            // A local copy stays in registers; `chunk` would be read from memory in every iteration.
             let mut sum = *chunk;
             for (k, (v, a)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
                 let j = first + k;
@@ -353,7 +354,7 @@ impl Domain {
             }
             *chunk = sum;
         });
-        // In order, whichever thread made them.
+        // In a fixed order, so that the sum is the same with any number of threads.
         let total = sums.iter().fold(MotionSum::default(), |total, chunk| MotionSum {
             kinetic_energy: total.kinetic_energy + chunk.kinetic_energy,
             acceleration: total.acceleration + chunk.acceleration,
@@ -376,8 +377,8 @@ impl Domain {
         power
     }
 
-    /// Local damping of Eq. 16 on the whole acceleration, the base's tractions included, against the velocity that
-    /// each node had before it. Returns the energy taken, kJ/m.
+    /// Adds local damping (Eq. 16) to the total acceleration, the base's tractions included, against the
+    /// velocity of each node before the step. Returns the energy taken, kJ/m.
     pub fn damp_locally(&mut self, dt: f64) -> f64 {
         let coefficient = self.damping.local;
         if coefficient == 0.0 {
@@ -385,7 +386,7 @@ impl Domain {
         }
         let Ground { velocity, acceleration, mass, .. } = &mut self.ground;
         let mut taken = 0.0;
-        // The copies behind the nodes have no mass here.
+        // The copies after the nodes have no mass here.
         let masses = mass.iter().chain(std::iter::repeat(&0.0));
         for ((v, a), mass) in velocity.iter_mut().zip(acceleration).zip(masses) {
             let before = *v - *a * dt;
@@ -401,10 +402,11 @@ impl Domain {
     pub fn update_viscosity(&mut self) {
         let Some(viscosity) = &mut self.damping.viscosity else { return };
         let Ground { model, geometry, points, position, velocity, phases, .. } = &self.ground;
-        viscosity.update(self.threaded, (model, geometry), points, (position, velocity, phases.volume()));
+        let nodes = MovingNodes { position, velocity, volume: phases.volume() };
+        viscosity.update(self.threaded, model, geometry, points, nodes);
     }
 
-    /// Strain, soil model and the shares of the next force loop, from the velocity at mid-step.
+    /// Updates strain, stress and the shares for the next force loop, from the velocity at mid-step.
     ///
     /// # Errors
     /// [`SolverError::Diverged`] or [`SolverError::Soil`].
@@ -429,7 +431,7 @@ impl Domain {
         Ok(work)
     }
 
-    /// Advances pore pressure by a step from the motion at its middle.
+    /// Advances pore pressure by a step, from the motion at mid-step.
     ///
     /// # Errors
     /// [`SolverError::Diverged`] if the matrix of implicit diffusion is not finite.
@@ -445,7 +447,7 @@ impl Domain {
         }
     }
 
-    /// Moves the nodes by a step, and the pressure that counts as no excess with them.
+    /// Moves the nodes by a step, and updates the pressure from which the excess counts.
     pub fn move_nodes(&mut self, dt: f64) {
         let Ground { position, velocity, water, .. } = &mut self.ground;
         for (x, v) in position.iter_mut().zip(velocity) {
@@ -456,15 +458,20 @@ impl Domain {
         }
     }
 
-    /// Builds the weights at the present place, with volumes, masses and water.
+    /// Builds the weights at the present positions, and updates volumes, masses and water.
     pub fn rebuild_geometry(&mut self) {
-        // The tables are replaced as a whole; the lists of the old ones serve while no node left their skin.
+        // All tables are replaced; the lists of the old ones are reused if they are still valid.
         let previous = self.ground.geometry.clone();
         self.counters.porosity_clips += self.ground.update_volumes();
         let outline = self.ground.outline();
         let Ground { model, position, phases, walls, .. } = &self.ground;
-        self.ground.geometry =
-            Geometry::build(model, position, phases.volume(), (&outline, *walls), Some(previous));
+        self.ground.geometry = Geometry::build(
+            model,
+            position,
+            phases.volume(),
+            EdgesView { outline: &outline, walls: *walls },
+            Some(previous),
+        );
         self.ground.update_surroundings(self.threaded);
         let time = self.clock.time;
         self.ground.with_water(&outline, |flow, section| flow.follow(section, time));
@@ -472,7 +479,7 @@ impl Domain {
         self.sharpen_contacts();
     }
 
-    /// Sets how edges act, and renews the geometry if that changes.
+    /// Sets the conditions of the edges, and rebuilds the geometry if they change.
     pub fn set_walls(&mut self, walls: Walls) {
         if walls != self.ground.walls {
             self.ground.walls = walls;
@@ -480,19 +487,19 @@ impl Domain {
         }
     }
 
-    /// With corrected inertia: strain with its kinks at contacts, and the masses that the operators give beside contacts and
-    /// edges.
+    /// With corrected inertia: adds the kinks at contacts to the gradients, and sets the masses that are
+    /// consistent with the operators beside contacts and edges.
     pub fn sharpen_contacts(&mut self) {
         let Some(CorrectedInertia { contacts: Some(contacts), .. }) = &self.inertia else { return };
         let outline = self.ground.outline();
         let Ground { model, position, points, geometry, mass, walls, .. } = &mut self.ground;
-        let value = stress_node_values(model, position, (&outline, *walls));
+        let value = stress_node_values(model, position, EdgesView { outline: &outline, walls: *walls });
         *mass = lumped_masses(&value, points, model.nodes());
-        contacts.sharpen(model, position, points, &value, (geometry, mass.as_mut_slice()));
+        contacts.sharpen(model, position, points, &value, geometry, mass);
     }
 
-    /// Refuses motion and pore pressure that are no longer finite, and motion that runs away. Strain and stress are
-    /// refused by the soil models, or show in the next step's motion.
+    /// Refuses motion and pore pressure that are no longer finite, and impossible velocities. The soil models
+    /// refuse strain and stress that are not finite, or the motion of the next step is not finite.
     ///
     /// # Errors
     /// [`SolverError::Diverged`] with the first node found.

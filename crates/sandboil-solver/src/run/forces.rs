@@ -14,19 +14,20 @@ use crate::{
 };
 use sandboil_sph::Vec2;
 
-/// Constant nodal forces, kN/m. What a scene does not have takes no memory.
+/// Constant nodal forces, kN/m. Parts that a scene does not have take no memory.
 ///
-/// In a stage of small displacements the sum is what balances the state at its start to the last bit; the part that is
-/// neither weight, still water, renewal nor load is the reaction: of the edges, and of whatever the statics left over.
+/// In a stage of small displacements the sum balances the state at the start of the stage to the last bit.
+/// The sum less weight, still water, renewal and load is the reaction: of the edges, and of the residual of
+/// the static stage.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct ConstantForces {
     /// Sum of all parts.
     total: Vec<Vec2>,
-    /// Of still water, whose pressure is that at rest or at the present place.
+    /// Of still water: of its pressure at rest, or at the present positions.
     still_water: Vec<Vec2>,
-    /// Balance of what renewed weights make of the present stress.
+    /// Balance of the changes by renewed weights.
     renewal: Vec<Vec2>,
-    /// Of a load that holds an excess pore pressure.
+    /// Of a load that balances an excess pore pressure.
     load: Vec<Vec2>,
 }
 
@@ -48,7 +49,7 @@ pub struct Power {
 }
 
 impl Power {
-    /// The sum of two.
+    /// The sum of two powers.
     #[must_use]
     pub fn plus(self, other: &Self) -> Self {
         Self {
@@ -63,7 +64,7 @@ impl Power {
 }
 
 impl ConstantForces {
-    /// None yet, on so many nodes.
+    /// No forces yet on `nodes` nodes.
     pub fn new(nodes: usize) -> Self {
         Self { total: vec![Vec2::zeros(); nodes], ..Self::default() }
     }
@@ -74,8 +75,8 @@ impl ConstantForces {
         self.total[j]
     }
 
-    /// Adds the power of the constant forces on node `j`, of a mass (Mg/m) that moves at a velocity (m/s), under `gravity`
-    /// (m/s2).
+    /// Adds the power of the constant forces on node `j` with a mass (Mg/m) and a velocity (m/s), under
+    /// `gravity` (m/s2).
     #[inline]
     pub fn add_power(&self, j: usize, mass: f64, velocity: Vec2, gravity: f64, power: &mut Power) {
         power.constant += self.total[j].dot(&velocity);
@@ -91,7 +92,8 @@ impl ConstantForces {
         }
     }
 
-    /// Weight and still water alone, each where the nodes are: `still_water` is the sequence of its contributions.
+    /// Sets the forces to weight and still water at the present positions; `still_water` lists its
+    /// contributions.
     pub fn set_present(&mut self, mass: &[f64], gravity: f64, still_water: &[Vec<Vec2>]) {
         let gravity = Vec2::new(0.0, -gravity);
         self.total.clear();
@@ -104,15 +106,15 @@ impl ConstantForces {
         }
     }
 
-    /// Makes a state one of rest: the sum balances `force` (kN/m), that of stress and pressure.
+    /// Sets the sum that balances `force` (kN/m), the force of stress and pressure.
     pub fn balance(&mut self, force: &[Vec2]) {
         self.total.clear();
         self.total.extend(force.iter().map(|force| -force));
         (self.renewal, self.load) = (Vec::new(), Vec::new());
     }
 
-    /// Makes a state one of rest under a load: the sum balances `force` less what is `held_back` from it (kN/m), and its
-    /// change is the load.
+    /// Sets the sum that balances `force` plus the force `held_back` (kN/m); the change of the sum is the
+    /// load.
     pub fn balance_under_load(&mut self, force: &[Vec2], held_back: impl Fn(usize) -> Vec2) {
         let before = self.total.clone();
         self.balance(force);
@@ -122,8 +124,9 @@ impl ConstantForces {
         self.load = self.total.iter().zip(before).map(|(now, before)| now - before).collect();
     }
 
-    /// Keeps a state in balance whose force of stress and pressure a renewal of the geometry has changed, kN/m.
-    pub fn carry_over(&mut self, before: &[Vec2], after: &[Vec2]) {
+    /// Keeps a state in balance when a renewal of the geometry changes the force of stress and pressure from
+    /// `before` to `after`, kN/m.
+    pub fn balance_renewal(&mut self, before: &[Vec2], after: &[Vec2]) {
         self.renewal.resize(self.total.len(), Vec2::zeros());
         for (j, (before, after)) in before.iter().zip(after).enumerate() {
             let change = before - after;
@@ -141,7 +144,7 @@ impl ConstantForces {
     }
 }
 
-/// What acts on the nodes by the present state.
+/// The forces of the present state on the nodes.
 #[derive(Clone, Copy)]
 pub struct NodalForces<'a> {
     /// Weights.
@@ -179,7 +182,8 @@ impl NodalForces<'_> {
         }
     }
 
-    /// Force on node `j`, moving at `velocity`, of stress and damping, and of excess pore pressure, `water` (Eq. 6), kN/m.
+    /// Force on node `j` at a velocity: of stress and damping, plus the force of excess pore pressure,
+    /// `water` (Eq. 6), kN/m.
     #[inline]
     pub fn internal(&self, j: usize, velocity: Vec2, water: Vec2) -> Vec2 {
         let mut force = match (self.printed, &self.geometry.printed) {

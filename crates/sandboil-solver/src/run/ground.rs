@@ -1,4 +1,4 @@
-//! The state of a section: where the ground is, how it moves, and what soil and water carry.
+//! The state of a section: positions, motion, soil and pore water.
 
 use crate::{
     edges::base::{Base, Impedance},
@@ -7,7 +7,7 @@ use crate::{
         description::{Model, Region, STRESS_NODES},
         edge_nodes::EdgeNodes,
         order::sorted,
-        outline::{Outline, Walls},
+        outline::{EdgesView, Outline, Walls},
     },
     skeleton::{
         deformation::Deformation, phases::Phases, point::StressPoint, section_view::SectionView,
@@ -23,36 +23,37 @@ use crate::{
 use sandboil_soil::Stress;
 use sandboil_sph::Vec2;
 
-/// Where base and sides are.
+/// Place of base and sides.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub enum Placement {
-    /// Where they were drawn.
+    /// As in the model.
     Drawn,
-    /// With the nodes along them, from these places (m), as far as the edges are free.
+    /// Moved with the nodes along them, in the components in which the edges are free, from these positions
+    /// (m).
     WithNodes(Vec<Vec2>),
-    /// Held where they were when a stage began.
+    /// Held at their place at the start of a stage.
     Held(Outline),
 }
 
-/// What large displacements need to know of the weights.
+/// Sharpness of the weights with large displacements.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub struct Sharpness {
     /// Sharpness of the weights of the lattice, 1/m2, for which the limits of the time step hold.
     lattice: [f64; 2],
-    /// Factor on those limits where nodes have come closer than in the lattice.
+    /// Factor on these limits where nodes are closer than in the lattice.
     pub step_factor: f64,
 }
 
 impl Sharpness {
-    /// That of the lattice of a model.
+    /// The sharpness of the lattice of a model.
     pub fn new(model: &Model) -> Self {
         let Model { position, volume, outline, .. } = model;
-        let edges = (outline, Walls::statics(outline));
+        let edges = EdgesView::statics(outline);
         let lattice = Geometry::build(model, position, volume, edges, None).sharpness(volume);
         Self { lattice, step_factor: 1.0 }
     }
 
-    /// Takes over weights of another sharpness, 1/m2.
+    /// Updates the factor for weights of another sharpness, 1/m2.
     pub fn update(&mut self, sharpness: [f64; 2]) {
         let squared = |(now, lattice): (f64, f64)| if lattice > 0.0 { now / lattice } else { 1.0 };
         let sharper = sharpness.into_iter().zip(self.lattice).map(squared).fold(1.0, f64::max);
@@ -69,15 +70,15 @@ pub struct Ground {
     pub order: Vec<usize>,
     /// Nodes along the edges.
     pub edges: EdgeNodes,
-    /// How the edges act.
+    /// Conditions of the edges.
     pub walls: Walls,
-    /// Where the edges are.
+    /// Place of the edges.
     pub placement: Placement,
-    /// Present places of the nodes, m.
+    /// Present positions of the nodes, m.
     pub position: Vec<Vec2>,
     /// Velocities of the nodes, m/s, followed by the copies of a neighbour's.
     pub velocity: Vec<Vec2>,
-    /// Accelerations likewise, m/s2.
+    /// Accelerations in the same order, m/s2.
     pub acceleration: Vec<Vec2>,
     /// Volumes, porosities and densities.
     pub phases: Phases,
@@ -87,13 +88,14 @@ pub struct Ground {
     pub points: Vec<StressPoint>,
     /// Soil models of the stress nodes.
     pub soil: SoilField,
-    /// Pore pressure, once the ground moves.
+    /// Pore pressure in a stage of moving ground.
     pub water: Option<Flow>,
-    /// Weights at the present place.
+    /// Weights at the present positions.
     pub geometry: Geometry,
     /// Sharpness of the weights, with large displacements.
     pub sharpness: Option<Sharpness>,
-    /// Outward normals of the nodes at the free surface, where it is found; empty in a dry section.
+    /// Outward normals of the nodes at the free surface, if it is found from the nodes; empty in a dry
+    /// section.
     pub free_surface: Option<Vec<Option<Vec2>>>,
 }
 
@@ -108,8 +110,13 @@ impl Ground {
         let nodes = model.nodes();
         let phases = Phases::new(&model);
         let walls = Walls::statics(&model.outline);
-        let geometry =
-            Geometry::build(&model, &model.position, phases.volume(), (&model.outline, walls), None);
+        let geometry = Geometry::build(
+            &model,
+            &model.position,
+            phases.volume(),
+            EdgesView { outline: &model.outline, walls },
+            None,
+        );
         let mut points: Vec<StressPoint> = (0..STRESS_NODES * nodes)
             .map(|s| {
                 let Region { earth_pressure_coefficient, .. } =
@@ -156,7 +163,7 @@ impl Ground {
         self.mass.iter().zip(&self.velocity).map(|(mass, v)| 0.5 * mass * v.norm_squared()).sum()
     }
 
-    /// The edges where they are: those that are free go with the mean of the nodes along them.
+    /// The edges at their present place: free edges move with the mean of the nodes along them.
     pub fn outline(&self) -> Outline {
         let from = match &self.placement {
             Placement::Drawn => return self.model.outline.clone(),
@@ -168,11 +175,11 @@ impl Ground {
             let mean = total / nodes.len().max(1) as f64;
             Vec2::new(if free[0] { mean.x } else { 0.0 }, if free[1] { mean.y } else { 0.0 })
         };
-        let sides = [0, 1].map(|k| moved(&self.edges.sides[k], self.walls.sides[k].leaves_free()));
-        self.model.outline.moved(moved(&self.edges.base, self.walls.base.leaves_free()), sides)
+        let sides = [0, 1].map(|k| moved(&self.edges.sides[k], self.walls.sides[k].free_components()));
+        self.model.outline.moved(moved(&self.edges.base, self.walls.base.free_components()), sides)
     }
 
-    /// The section as it stands, with its edges.
+    /// A view of the present section, with its edges.
     pub fn view<'a>(&'a self, outline: &'a Outline) -> SectionView<'a> {
         SectionView {
             model: &self.model,
@@ -187,24 +194,24 @@ impl Ground {
         }
     }
 
-    /// Updates the pore water with the section as it stands.
+    /// Updates the pore water with a view of the present section.
     pub fn with_water(&mut self, outline: &Outline, update: impl FnOnce(&mut Flow, SectionView)) {
         let Some(mut water) = self.water.take() else { return };
         update(&mut water, self.view(outline));
         self.water = Some(water);
     }
 
-    /// Makes room behind the nodes for copies of a neighbour's motion.
+    /// Sets the number of copies of a neighbour's motion after the nodes.
     pub fn resize_copies(&mut self, copies: usize) {
         for motion in [&mut self.velocity, &mut self.acceleration] {
             motion.resize(self.model.nodes() + copies, Vec2::zeros());
         }
     }
 
-    /// Volumes, densities and masses of the present strain, from which deformation starts again. Returns how many
-    /// porosities had to be kept in their range.
+    /// Updates volumes, densities and masses from the present strain, and restarts the deformation. Returns
+    /// how many porosities were clipped to their range.
     pub fn update_volumes(&mut self) -> u64 {
-        let clips = self.phases.follow(&self.points);
+        let clips = self.phases.update_volumes(&self.points);
         for (node, mass) in self.mass.iter_mut().enumerate() {
             *mass = self.phases.mass(node);
             let volume = self.phases.volume()[node];
@@ -217,8 +224,8 @@ impl Ground {
         clips
     }
 
-    /// Updates what depends on renewed weights with large displacements: their sharpness, and the free surface if water
-    /// crosses it.
+    /// With large displacements, updates the sharpness of renewed weights, and the free surface if there is
+    /// water.
     pub fn update_surroundings(&mut self, threaded: bool) {
         let volume = self.phases.volume();
         if let Some(sharpness) = &mut self.sharpness {
@@ -226,22 +233,22 @@ impl Ground {
         }
         if self.free_surface.is_some() && self.model.water.is_some() {
             let outline = self.outline();
-            let edges = (&outline, self.walls);
+            let edges = EdgesView { outline: &outline, walls: self.walls };
             self.free_surface = Some(free_surface(threaded, &self.model, &self.position, volume, edges));
         }
     }
 
-    /// Whether some stress node is strained beyond the range of its weights, or with large displacements a node has left its
-    /// list.
+    /// Whether some stress node is strained beyond the range of its weights, or with large displacements a
+    /// node has left the skin of the lists.
     pub fn is_strained(&self) -> bool {
         let limit = self.model.numerics.geometry_strain_limit();
-        if self.sharpness.is_some() && self.geometry.lists().are_left(&self.model, &self.position) {
+        if self.sharpness.is_some() && self.geometry.lists().is_skin_left(&self.model, &self.position) {
             return true;
         }
         self.points.iter().any(|point| point.deformation.magnitude() > limit)
     }
 
-    /// Starts strains, which count from the start of a stage.
+    /// Sets strains to zero at the start of a stage.
     pub fn restart_strain(&mut self) {
         self.phases.restart_strain();
         for point in &mut self.points {
@@ -249,8 +256,8 @@ impl Ground {
         }
     }
 
-    /// The half-space below each base point: as given, or of the layer above it, with the model's small-strain moduli at
-    /// the base's stress.
+    /// The half-space below each base point: as given, or as the layer above it, with the soil's small-strain
+    /// moduli at the stress of the base.
     ///
     /// # Errors
     /// Soil that refuses its stress.
@@ -273,7 +280,7 @@ impl Ground {
                     zz: at_base(&|s| s.zz),
                 };
                 let Some(given) = base.half_space else { return self.impedance_at(node, stress) };
-                // Without a compression-wave speed nothing needs one: a level roller base.
+                // A level roller base, for which no compression-wave speed is given, does not use this value.
                 let compression_speed = given.compression_speed.unwrap_or(given.shear_speed);
                 Ok(Impedance { density: given.density, shear_speed: given.shear_speed, compression_speed })
             })

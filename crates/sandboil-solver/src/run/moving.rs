@@ -1,7 +1,7 @@
-//! A stage of moving ground under way: the leapfrog step.
+//! A running stage of moving ground: the leapfrog step.
 
 use crate::{
-    edges::{compliant_base::CompliantBase, contact::stick_to_edges, dashpots::NodalMotion},
+    edges::{compliant_base::CompliantBase, contact::stop_near_edges, dashpots::NodalMotion},
     error::SolverError,
     run::{
         clock::CHECK_INTERVAL,
@@ -20,7 +20,7 @@ use crate::{
 pub enum Lead {
     /// The ground itself.
     Own,
-    /// A section beside which the ground is a column.
+    /// The section beside the ground, which is a column.
     Section,
 }
 
@@ -34,9 +34,9 @@ pub struct Moving<N> {
     pub base: Option<CompliantBase>,
     /// The ground beside it, if any.
     pub neighbour: Option<N>,
-    /// How pore pressure takes part in the limit of the time step.
+    /// How pore pressure enters the limit of the time step.
     pub coupling: PressureCoupling,
-    /// What is recorded.
+    /// Histories, envelopes and energy.
     pub observers: Observers,
 }
 
@@ -70,7 +70,7 @@ impl<N: Neighbour> Moving<N> {
         Ok(())
     }
 
-    /// Whether the stage ends at a time (s) that is reached by steps of `dt`, s.
+    /// Whether the stage ends at a time (s), with steps of `dt`, s.
     pub fn is_over(&self, time: f64, dt: f64) -> bool {
         time + 0.5 * dt >= self.stage.duration()
     }
@@ -79,7 +79,7 @@ impl<N: Neighbour> Moving<N> {
         self.observers.energy_history.is_due(time) || self.is_over(time, dt)
     }
 
-    /// Ground with large displacements outgrows its weights in a few steps.
+    /// With large displacements weights are valid for a few steps only.
     fn is_check_due(&self, step: u64) -> bool {
         self.stage.displacements == Displacements::Large || step.is_multiple_of(CHECK_INTERVAL)
     }
@@ -95,7 +95,7 @@ impl<N: Neighbour> Moving<N> {
         Ok(())
     }
 
-    /// The tractions of base and sides, on velocities that the section's own forces have changed already.
+    /// Adds the tractions of base and sides to velocities that the section's own forces have already changed.
     fn end_edges(&mut self, domain: &mut Domain, dt: f64) {
         let time = domain.clock.time;
         let Ground { mass, velocity, acceleration, .. } = &mut domain.ground;
@@ -120,14 +120,14 @@ impl<N: Neighbour> Moving<N> {
         EdgeWork { base, sides: self.neighbour.as_ref().map_or(0.0, of_side), local_damping }
     }
 
-    /// Finiteness, stability limit and geometry, every few steps.
+    /// Checks finiteness, stability limit and geometry, every few steps.
     fn check(&mut self, domain: &mut Domain, lead: Lead) -> Result<(), SolverError> {
         self.guard(domain)?;
         if let Some(flow) = &mut domain.ground.water {
             flow.refresh(&domain.ground.model, domain.clock.time);
         }
         let limit = self.limit(domain);
-        domain.counters.time_step_changes += u64::from(domain.clock.follow(limit));
+        domain.counters.time_step_changes += u64::from(domain.clock.update(limit));
         let beside = self.neighbour.as_ref().is_some_and(N::is_strained);
         if lead == Lead::Own && (domain.ground.is_strained() || beside) {
             self.observers.begin_renewal(domain);
@@ -138,7 +138,8 @@ impl<N: Neighbour> Moving<N> {
         Ok(())
     }
 
-    /// Refuses motion and pore pressure that are no longer finite. The neighbour comes first: it drives the section.
+    /// Refuses motion and pore pressure that are no longer finite. The neighbour is checked first, because it
+    /// drives the section.
     ///
     /// # Errors
     /// The first node found.
@@ -153,7 +154,7 @@ impl<N: Neighbour> Moving<N> {
     }
 }
 
-/// Time step of a section at a factor of its limit, and no longer than its neighbour allows.
+/// Time step of a section: a factor times its limit, and at most that of its neighbour.
 pub fn shared_limit<N: Neighbour>(
     domain: &Domain,
     neighbour: Option<&N>,
@@ -165,7 +166,7 @@ pub fn shared_limit<N: Neighbour>(
     beside.map_or(own, |limit| own.least(limit))
 }
 
-/// Stops single nodes before held edges, with large displacements.
+/// With large displacements, stops single nodes in front of held edges.
 fn stop_at_edges(domain: &mut Domain, dt: f64) {
     let Ground { model, placement: Placement::Held(outline), position, velocity, acceleration, .. } =
         &mut domain.ground
@@ -173,5 +174,5 @@ fn stop_at_edges(domain: &mut Domain, dt: f64) {
         return;
     };
     let motion = NodalMotion { velocity, acceleration };
-    domain.counters.edge_contacts += stick_to_edges(model, outline, position, motion, dt);
+    domain.counters.edge_contacts += stop_near_edges(model, outline, position, motion, dt);
 }

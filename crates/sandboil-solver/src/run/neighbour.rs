@@ -1,4 +1,4 @@
-//! Ground beside a section that acts on it and does not feel it.
+//! Ground beside a section: it acts on the section, and the section does not act on it.
 
 use crate::{
     edges::dashpots::NodalMotion,
@@ -15,7 +15,8 @@ use std::fmt::Debug;
 
 /// Ground beside a section: one-way coupled, advanced before the section in every step.
 pub trait Neighbour: Debug + Send + Sync + Serialize + DeserializeOwned {
-    /// The neighbours that a stage asks for, at rest under `gravity` where there was such a stage, and coupled.
+    /// The neighbours that a stage needs, coupled, and brought to rest by the static stage `gravity` if there
+    /// was one.
     ///
     /// # Errors
     /// A neighbour that does not come to rest, or soil that refuses its stress.
@@ -31,26 +32,27 @@ pub trait Neighbour: Debug + Send + Sync + Serialize + DeserializeOwned {
     /// Soil that refuses its stress.
     fn begin(&mut self, section: &SectionView, stage: &Stage) -> Result<(), SolverError>;
 
-    /// Number of velocities that the section's strain reads beside its own.
+    /// Number of the neighbour's velocities that the section's strain reads.
     fn copied_velocities(&self) -> usize;
 
     /// Adds the weights of the copied velocities, from index `nodes` on, to a geometry; once for each renewal.
     fn couple(&mut self, geometry: &mut Geometry, nodes: usize);
 
-    /// The first half of a step: advances by `dt` (s), and keeps the section's velocity on the common edges.
+    /// The first half of a step: advances by `dt` (s), and stores the section's velocity at the common edges.
     ///
     /// # Errors
     /// A neighbour that has diverged.
     fn begin_step(&mut self, dt: f64, velocity: &[Vec2]) -> Result<(), SolverError>;
 
-    /// Adds the stress of the neighbour to the motion, which the section's own forces have changed already.
+    /// Adds the stress of the neighbour to the motion, which the section's own forces have already changed.
     fn push(&self, dt: f64, mass: &[f64], motion: &mut NodalMotion);
 
-    /// Adds the dashpots between both, and copies the neighbour's motion behind the section's.
+    /// Adds the dashpots between section and neighbour, and copies the neighbour's motion to the end of the
+    /// section's.
     fn end_step(&mut self, dt: f64, mass: &[f64], motion: &mut NodalMotion);
 
-    /// Energy that the step brings into the section, kJ/m. The velocities have had all their forces, the stress is that at
-    /// the beginning of the step.
+    /// Work of the neighbour on the section in a step, kJ/m, from velocities that include all forces of the
+    /// step and the stress at its beginning.
     fn work(
         &self,
         dt: f64,
@@ -75,13 +77,13 @@ pub trait Neighbour: Debug + Send + Sync + Serialize + DeserializeOwned {
     /// Sets the excess pore pressure of the neighbour to that of the section beside it, kPa, held in balance.
     fn set_excess(&mut self, edges: &EdgeNodes, excess: &[f64]);
 
-    /// Refuses motion or pore pressure that is no longer finite, and motion that runs away.
+    /// Refuses motion or pore pressure that is no longer finite, and impossible velocities.
     ///
     /// # Errors
     /// The first node found.
     fn guard(&self) -> Result<(), SolverError>;
 
-    /// The records of the left and the right side in the stage, if they are kept; once.
+    /// Takes out the records of the left and the right side in the stage, if there are any.
     fn take_records(&mut self) -> [Option<ColumnRecord>; 2];
 
     /// Bytes held.

@@ -1,4 +1,5 @@
-//! What may be read of a simulation: arrays in the user's node order, and quantities of a column for the section beside it.
+//! Output of a simulation: arrays in the user's node order, and quantities of a column for the section beside
+//! it.
 
 use crate::{
     edges::{
@@ -51,7 +52,7 @@ impl<N: Neighbour> Driver<N> {
         }
     }
 
-    /// Work done in the stage; the section's first geometry belongs to none.
+    /// Counts of the work done in the stage; the section's first geometry is not counted.
     pub fn counters(&self) -> Counters {
         self.domain.counters
     }
@@ -66,7 +67,7 @@ impl<N: Neighbour> Driver<N> {
         self.domain.ground.nodes()
     }
 
-    /// Pairs between stress and velocity nodes, images folded.
+    /// Pairs of a stress node and a velocity node; images count as their nodes.
     pub fn pairs(&self) -> usize {
         self.domain.ground.geometry.pairs()
     }
@@ -111,7 +112,7 @@ impl<N: Neighbour> Driver<N> {
         ]
     }
 
-    /// Names and bytes of the arrays that exist: what a scene did not ask for is not in the list.
+    /// Names and bytes of the arrays that exist; arrays that a scene does not need are not in the list.
     pub fn arrays(&self) -> Vec<(&'static str, usize)> {
         let Domain { ground, forces, damping, inertia, workspace, .. } = &self.domain;
         let Ground { position, velocity, acceleration, points, geometry, phases, water, soil, .. } = ground;
@@ -147,7 +148,7 @@ impl<N: Neighbour> Driver<N> {
         all.into_iter().filter_map(|(name, bytes)| bytes.map(|bytes| (name, bytes))).collect()
     }
 
-    /// Positions without periodic wrapping (virtual coordinates), m: lateral sway is seen.
+    /// Positions without periodic wrapping (virtual coordinates), m: lateral displacement is not hidden.
     pub fn position(&self) -> Vec<[f64; 2]> {
         let ground = &self.domain.ground;
         ground.in_user_order(|j| ground.position[j].into())
@@ -203,13 +204,13 @@ impl<N: Neighbour> Driver<N> {
         ground.in_user_order(|j| [0, 1].map(|k| ground.points[STRESS_NODES * j + k].strain))
     }
 
-    /// Largest excess pore pressure of every node since shaking began, kPa, if it is kept.
+    /// Largest excess pore pressure of every node since shaking began, kPa, if it is recorded.
     pub fn largest_excess_pore_pressure(&self) -> Option<Vec<f64>> {
         let envelope = self.moving()?.observers.envelopes.pressure.as_ref()?;
         Some(self.domain.ground.in_user_order(|j| envelope[j]))
     }
 
-    /// Largest engineering shear strain of every node since shaking began, if it is kept.
+    /// Largest engineering shear strain of every node since shaking began, if it is recorded.
     pub fn largest_shear_strain(&self) -> Option<Vec<f64>> {
         let envelope = self.moving()?.observers.envelopes.strain.as_ref()?;
         let largest = |j: usize| envelope[STRESS_NODES * j].max(envelope[STRESS_NODES * j + 1]);
@@ -223,7 +224,7 @@ impl<N: Neighbour> Driver<N> {
     }
 }
 
-/// What a section reads of the column beside it, by internal index.
+/// Quantities of a column that the section beside it reads, by internal index.
 impl<N: Neighbour> Driver<N> {
     /// Internal index of every node, in the user's order.
     pub(crate) fn internal_order(&self) -> Vec<usize> {

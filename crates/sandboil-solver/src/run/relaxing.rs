@@ -1,14 +1,14 @@
-//! A static stage under way: gravity relaxed by kinetic damping.
+//! A running static stage: gravity is applied and motion is stopped by kinetic damping.
 
 use crate::{
     error::SolverError,
     run::domain::{Domain, MotionSum},
 };
 
-/// Mean over largest unbalanced acceleration that the stage asks for.
+/// Tolerance on the mean unbalanced acceleration, over the tolerance on the largest.
 const MEAN_RESIDUAL: f64 = 0.1;
 
-/// A static stage under way.
+/// A running static stage.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Relaxing {
     tolerance: f64,
@@ -21,7 +21,8 @@ pub struct Relaxing {
 }
 
 impl Relaxing {
-    /// A stage that ends at a largest unbalanced acceleration over gravity, or fails after so many steps.
+    /// A stage that ends when the largest unbalanced acceleration over gravity is at most `tolerance`, or
+    /// fails after `max_steps` steps.
     pub fn new(tolerance: f64, max_steps: u64) -> Self {
         Self { tolerance, max_steps, kinetic_energy: 0.0, residual: f64::INFINITY, at_rest: false }
     }
@@ -32,10 +33,10 @@ impl Relaxing {
     /// [`SolverError::Diverged`], [`SolverError::NotAtRest`].
     pub fn step(&mut self, domain: &mut Domain) -> Result<(), SolverError> {
         let dt = domain.clock.dt;
-        // From rest the first kick of a leapfrog spans half a step; a whole one would let modes near the
-        // stability limit flip for ever between two stops.
-        let kick = if self.kinetic_energy == 0.0 { 0.5 * dt } else { dt };
-        let sum = domain.accelerate::<true>(kick);
+        // From rest the first velocity update of a leapfrog is over half a step. With a whole step, modes
+        // near the stability limit would alternate between two stops for ever.
+        let update = if self.kinetic_energy == 0.0 { 0.5 * dt } else { dt };
+        let sum = domain.accelerate::<true>(update);
         domain.check_finite("acceleration", |ground, j| ground.acceleration[j].norm(), f64::INFINITY)?;
         if self.is_at_rest(domain, &sum) {
             self.at_rest = true;

@@ -2,7 +2,7 @@
 
 use crate::run::{domain::Domain, ground::Ground, neighbour::Neighbour};
 
-/// Builds the geometry at the present place, and that of the neighbour with it.
+/// Builds the geometry at the present positions, and that of the neighbour.
 pub fn renew(domain: &mut Domain, neighbour: Option<&mut impl Neighbour>) {
     if domain.ground.sharpness.is_some() {
         renew_in_place(domain);
@@ -12,11 +12,11 @@ pub fn renew(domain: &mut Domain, neighbour: Option<&mut impl Neighbour>) {
     domain.refresh_present_shares();
 }
 
-/// With large displacements: weight and still water act where the ground is now.
+/// With large displacements: weight and still water act at the present positions.
 fn renew_in_place(domain: &mut Domain) {
     let before = domain.ground.mass.clone();
     domain.rebuild_geometry();
-    // Water that pores have taken in was at rest; the momentum of lost water leaves with it.
+    // Water that has entered pores was at rest; water that has left takes its momentum with it.
     let Ground { velocity, mass, .. } = &mut domain.ground;
     for ((v, before), mass) in velocity.iter_mut().zip(before).zip(mass) {
         *v *= (before / *mass).min(1.0);
@@ -24,9 +24,9 @@ fn renew_in_place(domain: &mut Domain) {
     domain.set_present_forces();
 }
 
-/// With small displacements: a strained lattice has other weights than the one it came from. The difference they make to the
-/// force of the present stresses stays as a constant force, so that the soil is not struck by the change: blows of a few
-/// hundredths of gravity would liquefy it further.
+/// With small displacements: the renewed weights change the forces of the present stress. The difference
+/// stays as a constant force, so that the change does not shock the soil: accelerations of a few hundredths
+/// of gravity would liquefy it further.
 fn renew_in_balance(domain: &mut Domain, neighbour: Option<&mut impl Neighbour>) {
     let mut before = domain.static_force();
     domain.rebuild_geometry();
@@ -38,5 +38,5 @@ fn renew_in_balance(domain: &mut Domain, neighbour: Option<&mut impl Neighbour>)
         let nodes = domain.ground.nodes();
         neighbour.couple(&mut domain.ground.geometry, nodes);
     }
-    domain.forces.carry_over(&before, &after);
+    domain.forces.balance_renewal(&before, &after);
 }

@@ -17,7 +17,7 @@ use crate::{
 use serde::de::DeserializeOwned;
 use std::io::{self, Write};
 
-/// The stage under way.
+/// The running stage.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 #[serde(bound(deserialize = "N: DeserializeOwned"))]
 pub enum Active<N> {
@@ -29,7 +29,7 @@ pub enum Active<N> {
     Moving(Box<Moving<N>>),
 }
 
-/// A section and its state, with the ground `N` beside it. Every array that leaves is in the user's node order.
+/// A section and its state, with the ground `N` beside it. All output arrays are in the user's node order.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 #[serde(bound(deserialize = "N: DeserializeOwned"))]
 pub struct Driver<N> {
@@ -55,7 +55,7 @@ impl<N: Neighbour> Driver<N> {
     /// [`checkpoint::note`] reads.
     ///
     /// # Errors
-    /// Those of `to`.
+    /// Errors of the writer `to`.
     pub fn store(&self, note: &[u8], to: impl Write) -> io::Result<()> {
         checkpoint::write(self, note, to)
     }
@@ -89,7 +89,7 @@ impl<N: Neighbour> Driver<N> {
         let outcome = pool.run(|| self.run(steps, until));
         self.pool = pool;
         let done = outcome??;
-        // A state that is not finite is never read, stored or continued.
+        // A state that is not finite must not be read, stored or continued.
         self.guard()?;
         Ok(done)
     }
@@ -97,7 +97,7 @@ impl<N: Neighbour> Driver<N> {
     fn run(&mut self, steps: u64, until: f64) -> Result<bool, SolverError> {
         for _ in 0..steps {
             let clock = &self.domain.clock;
-            // Half a step of tolerance: output never changes the time step.
+            // A tolerance of half a step: output does not change the time step.
             if self.is_complete() || clock.time + 0.5 * clock.dt >= until {
                 break;
             }
@@ -143,7 +143,7 @@ impl<N: Neighbour> Driver<N> {
         }
     }
 
-    /// The stage of moving ground under way, if it is one.
+    /// The running stage, if the ground moves in it.
     pub(super) fn moving(&self) -> Option<&Moving<N>> {
         match &self.active {
             Active::Moving(stage) => Some(stage),
@@ -158,7 +158,7 @@ impl<N: Neighbour> Driver<N> {
         }
     }
 
-    /// Closes the samples still collecting, for a run that ends before its stage does: their windows are one-sided.
+    /// Completes the open samples of a run that ends before its stage does, with one-sided windows.
     pub fn finish_histories(&mut self) {
         let time = self.domain.clock.time;
         if let Some(stage) = self.moving_mut() {
@@ -176,7 +176,8 @@ impl<N: Neighbour> Driver<N> {
         self.moving_mut().map(|stage| stage.observers.histories.take()).unwrap_or_default()
     }
 
-    /// The records of the free-field columns of the left and the right side in the stage, if they are kept; once.
+    /// Takes out the records of the free-field columns of the left and the right side in the stage, if there
+    /// are any.
     pub fn take_column_records(&mut self) -> [Option<ColumnRecord>; 2] {
         let neighbour = self.moving_mut().and_then(|stage| stage.neighbour.as_mut());
         neighbour.map_or([None, None], N::take_records)

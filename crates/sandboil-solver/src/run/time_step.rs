@@ -1,4 +1,4 @@
-//! The largest stable time step, by measured limits, and what sets it.
+//! The largest stable time step, from measured limits, and what limits it.
 
 use crate::{
     section::description::{Model, Operators},
@@ -10,21 +10,23 @@ use sandboil_sph::{
     operators::{corrected_gradient, laplacian_factor},
 };
 
-/// Limit of the skeleton wave over `h / c_d` with free surfaces: 0.994 at h = 1.4 dx, where it is least.
+/// Limit of the skeleton wave over `h / c_d` with free surfaces: the least value, 0.994, is that of h = 1.4
+/// dx.
 pub const DRAINED_COEFFICIENT: f64 = 0.99;
-/// Largest factor of dispersion-corrected inertia on the squared frequency of any wave: the limit becomes `0.71 h / c_d`
-/// (0.713 at h = 1.4 dx and Poisson's ratio zero, where it is least).
+/// Largest factor of dispersion-corrected inertia on the squared frequency of any wave: the limit becomes
+/// `0.71 h / c_d` (the least value, 0.713, is that of h = 1.4 dx and Poisson's ratio zero).
 pub const CORRECTED_RESPONSE: f64 = (DRAINED_COEFFICIENT / 0.71) * (DRAINED_COEFFICIENT / 0.71);
-/// The same on the rates of the velocity filter (2.53 at h = 1.4 dx).
+/// Largest factor of dispersion-corrected inertia on the rates of the velocity filter (2.53 at h = 1.4 dx).
 pub const CORRECTED_FILTER: f64 = 2.55;
-/// Limit of the undrained wave over `h / c_u`, surfaces at prescribed pressure.
+/// Limit of the undrained wave over `h / c_u`, with prescribed pressure at the surfaces.
 pub const UNDRAINED_COEFFICIENT: f64 = 1.7;
-/// The same where pressure is prescribed nowhere: undrained soil.
+/// The same without prescribed pressure: undrained soil.
 pub const FREE_UNDRAINED_COEFFICIENT: f64 = 0.9;
-/// Damping ratio of the fastest wave by a unit of artificial viscosity: its rate is at most `2 alpha c / h`.
+/// Damping ratio of the fastest wave for artificial viscosity with `alpha = 1`: its rate is at most `2 alpha
+/// c / h`.
 pub const VISCOSITY_RATIO: f64 = 0.5;
-/// Share of the lattice's drainage that is left to a few nodes of flowing ground which touch each other alone: through the
-/// surface, `2/dx^2` of up to `8/dx^2`.
+/// Drainage of a few run-out nodes that touch only each other, over that of the lattice: through the surface,
+/// `2/dx^2` of up to `8/dx^2`.
 pub const FREE_SURFACE_DRAINAGE: f64 = 0.25;
 /// Explicit diffusion: `dt <= 0.65 dx^2 C / k`.
 pub const DIFFUSION_COEFFICIENT: f64 = 0.65;
@@ -32,13 +34,16 @@ pub const DIFFUSION_COEFFICIENT: f64 = 0.65;
 pub const FILTER_EIGENVALUE: f64 = 1.05;
 /// Largest shear-wave over compression-wave speed of a soil: that of Poisson's ratio zero.
 pub const LARGEST_SPEED_RATIO: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// Damping ratio of the fastest wave above which its viscous part alone, `dt < 1/(xi w)`, allows less than the wave,
-/// `dt < 2/w`.
+/// Damping ratio of the fastest wave above which the limit of the viscous part alone, `dt < 1/(xi w)`, is
+/// shorter than that of the wave, `dt < 2/w`.
 pub const VISCOUS_RATIO: f64 = 0.5;
 /// Wave numbers sampled along an axis and along a diagonal of the lattice.
 pub const SPECTRUM_SAMPLES: u32 = 24;
 /// Bisections of the implicit limit: one part in a thousand.
 pub const BISECTIONS: u32 = 12;
+/// Share of the drained limit above which a limit with implicit diffusion counts as drained.
+const NEARLY_DRAINED: f64 = 0.99;
+
 /// What limits the time step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Criterion {
@@ -47,7 +52,7 @@ pub enum Criterion {
     DrainedWave,
     /// Compression wave with the pore water's stiffness.
     UndrainedWave,
-    /// Compression wave whose pore water drains in part within a step (implicit diffusion).
+    /// Compression wave whose pore water partly drains within a step (implicit diffusion).
     DrainingWave,
     /// Explicit diffusion of pore pressure.
     Diffusion,
@@ -56,7 +61,7 @@ pub enum Criterion {
 }
 
 impl Criterion {
-    /// In the user's words.
+    /// Name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::DrainedWave => "drained compression wave",
@@ -85,7 +90,7 @@ impl TimeLimit {
     }
 }
 
-/// How pore pressure takes part in the limit.
+/// How pore pressure enters the limit of the time step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum PressureCoupling {
     /// No water, or frozen pressure.
@@ -96,7 +101,7 @@ pub enum PressureCoupling {
     Implicit,
 }
 
-/// How the pressure operators of Eq. 7 see waves on the undeformed lattice.
+/// Spectrum of the pressure operators of Eq. 7 on the undeformed lattice.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PressureSpectrum {
     /// Pairs of eigenvalues, 1/m2: of the divergence followed by its transpose, and of the Laplacian.
@@ -132,9 +137,9 @@ impl PressureSpectrum {
         Self { eigenvalues }
     }
 
-    /// Largest share of the stability bound that implicitly diffused pressure takes at a step `dt`: a mode that
-    /// flips sign each step is bounded by `s/4 + q / (2 (2 + kappa lambda dt)) < 1`, with `s` and `q` the
-    /// skeleton's and the water's squared frequencies times `dt^2`.
+    /// Largest share of implicitly diffused pressure in the stability bound at a step `dt`: a mode that
+    /// changes sign in each step is bounded by `s/4 + q / (2 (2 + kappa lambda dt)) < 1`, with `s` and `q`
+    /// the skeleton's and the water's squared frequencies times `dt^2`.
     fn share(&self, stiffness_over_density: f64, diffusivity: f64, dt: f64) -> f64 {
         self.eigenvalues
             .iter()
@@ -155,87 +160,157 @@ pub fn filter_ratio(model: &Model) -> f64 {
     0.25 * damping * model.numerics.smoothing_ratio
 }
 
-/// What a damping ratio of the fastest wave leaves of its limit `dt_0 = 2/w`.
+/// Factor of the damping ratio of the fastest wave on its limit `dt_0 = 2/w`.
 ///
 /// A leapfrog with damping `2 xi w` on the lagging velocity is stable while `(dt/dt_0)^2 + 2 xi (dt/dt_0) < 1`.
-pub fn left_by_damping(ratio: f64) -> f64 {
+pub fn damping_factor(ratio: f64) -> f64 {
     (1.0 + ratio * ratio).sqrt() - ratio
 }
 
-/// What the limit of the time step depends on beside the soil.
+/// Input of the limit of the time step besides the soil.
 #[derive(Clone, Copy)]
 pub struct Limits<'a> {
-    /// How pore pressure takes part.
+    /// How pore pressure enters the limit.
     pub coupling: PressureCoupling,
     /// Spectrum of the pressure operators, read with implicit diffusion only.
     pub spectrum: &'a PressureSpectrum,
-    /// Rayleigh damping, which acts on the skeleton alone: its rate is that of the skeleton's fastest wave, whatever the
-    /// water adds to the frequency.
+    /// Rayleigh damping, which acts on the skeleton alone: its rate is that of the skeleton's fastest wave,
+    /// without the stiffness of the water.
     pub rayleigh: Option<&'a Rayleigh>,
     /// Whether inertia is corrected for dispersion.
     pub is_corrected: bool,
-    /// Coefficient of the artificial viscosity, 1.
+    /// Coefficient of the artificial viscosity, dimensionless.
     pub viscosity: f64,
-    /// Whether the pressure of nodes below the surface is tied to it; else no pressure is prescribed within a step.
+    /// Whether the pressure of the nodes below the surface is tied to the surface; if not, no pressure is
+    /// prescribed within a step.
     pub surface_is_tied: bool,
 }
 
-/// Limit for one region at a skeleton stiffness `K + 4G/3` in kPa, s.
+/// The fastest waves of one region: their limits of the time step.
+struct RegionWaves<'a> {
+    model: &'a Model,
+    region: usize,
+    limits: &'a Limits<'a>,
+    /// Stiffness `K + 4G/3` of the skeleton, kPa.
+    skeleton_stiffness: f64,
+    /// Density over the largest factor of corrected inertia on squared frequencies, Mg/m3.
+    density: f64,
+    /// Damping ratio of velocity filter and artificial viscosity.
+    filter: f64,
+}
+
+impl<'a> RegionWaves<'a> {
+    fn new(model: &'a Model, region: usize, skeleton_stiffness: f64, limits: &'a Limits) -> Self {
+        let (response, filter_response) =
+            if limits.is_corrected { (CORRECTED_RESPONSE, CORRECTED_FILTER) } else { (1.0, 1.0) };
+        let viscosity = VISCOSITY_RATIO * limits.viscosity;
+        Self {
+            model,
+            region,
+            limits,
+            skeleton_stiffness,
+            density: model.mixture_density(region) / response,
+            filter: filter_ratio(model) * filter_response / response.sqrt() + viscosity,
+        }
+    }
+
+    /// Limit of a wave without damping, s.
+    fn undamped(&self, coefficient: f64, stiffness: f64) -> f64 {
+        coefficient * self.model.smoothing_length() / (stiffness / self.density).sqrt()
+    }
+
+    fn undamped_drained(&self) -> f64 {
+        self.undamped(DRAINED_COEFFICIENT, self.skeleton_stiffness)
+    }
+
+    /// Ratio of Rayleigh damping, `rate / (2 w)`, for a wave with the undamped limit `2/w`, s.
+    fn rayleigh_ratio(&self, limit: f64) -> f64 {
+        let rate = self.limits.rayleigh.map_or(0.0, |damping| damping.rate(2.0 / self.undamped_drained()));
+        0.25 * rate * limit
+    }
+
+    /// Limit of a wave with all damping.
+    fn damped(&self, coefficient: f64, stiffness: f64, criterion: Criterion) -> TimeLimit {
+        let limit = self.undamped(coefficient, stiffness);
+        let ratio = self.rayleigh_ratio(limit);
+        let criterion = if ratio > VISCOUS_RATIO { Criterion::Damping } else { criterion };
+        TimeLimit { dt: limit * damping_factor(self.filter + ratio), criterion }
+    }
+
+    fn drained(&self) -> TimeLimit {
+        self.damped(DRAINED_COEFFICIENT, self.skeleton_stiffness, Criterion::DrainedWave)
+    }
+
+    fn undrained(&self) -> TimeLimit {
+        let stiffness = self.skeleton_stiffness + self.water_stiffness();
+        self.damped(self.undrained_coefficient(), stiffness, Criterion::UndrainedWave)
+    }
+
+    fn water_stiffness(&self) -> f64 {
+        self.model.water_stiffness(self.model.regions[self.region].porosity)
+    }
+
+    fn largest_diffusivity(&self) -> f64 {
+        self.model.pressure_diffusivity(self.region, |k| k.major)
+    }
+
+    fn undrained_coefficient(&self) -> f64 {
+        if self.largest_diffusivity() > 0.0 && self.limits.surface_is_tied {
+            UNDRAINED_COEFFICIENT
+        } else {
+            FREE_UNDRAINED_COEFFICIENT
+        }
+    }
+
+    /// Limit of the waves and of explicit diffusion together.
+    fn with_explicit_diffusion(&self, waves: TimeLimit) -> TimeLimit {
+        let area = self.model.spacing.x.min(self.model.spacing.y).powi(2);
+        let diffusion = DIFFUSION_COEFFICIENT * area / self.largest_diffusivity();
+        let dt = (waves.dt.powi(-2) + diffusion.powi(-2)).powf(-0.5);
+        let criterion = if diffusion < waves.dt { Criterion::Diffusion } else { waves.criterion };
+        TimeLimit { dt, criterion }
+    }
+
+    /// Limit with implicit diffusion, between that of `undrained` waves and the drained one, by bisection: water that
+    /// drains at the scale of the spacing within a step adds no stiffness to the short waves.
+    fn with_implicit_diffusion(&self, undrained: TimeLimit) -> TimeLimit {
+        let drained = self.drained();
+        let damping = damping_factor(self.filter + self.rayleigh_ratio(self.undamped_drained()));
+        let drainage = if self.limits.surface_is_tied { 1.0 } else { FREE_SURFACE_DRAINAGE };
+        // In anisotropic soil the smallest conductivity drains last.
+        let diffusivity = drainage * self.model.pressure_diffusivity(self.region, |k| k.minor);
+        let surface_factor = (UNDRAINED_COEFFICIENT / self.undrained_coefficient()).powi(2);
+        let water = surface_factor * self.water_stiffness() / self.density;
+        let is_stable = |dt: f64| {
+            let share = self.limits.spectrum.share(water, diffusivity, dt / damping);
+            (dt / drained.dt).powi(2) + share <= 1.0
+        };
+        let (mut low, mut high) = (undrained.dt.min(drained.dt), drained.dt);
+        if !is_stable(low) {
+            return undrained;
+        }
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if is_stable(middle) { low = middle } else { high = middle }
+        }
+        let is_drained = low > NEARLY_DRAINED * drained.dt;
+        TimeLimit { dt: low, criterion: if is_drained { drained.criterion } else { Criterion::DrainingWave } }
+    }
+}
+
+/// Limit for one region at a skeleton stiffness `K + 4G/3` in kPa.
 pub fn region_limit(model: &Model, region: usize, skeleton_stiffness: f64, limits: &Limits) -> TimeLimit {
-    let Limits { coupling, spectrum, rayleigh, is_corrected, viscosity, surface_is_tied } = *limits;
-    let h = model.smoothing_length();
-    let (response, filtered) = if is_corrected { (CORRECTED_RESPONSE, CORRECTED_FILTER) } else { (1.0, 1.0) };
-    let density = model.mixture_density(region) / response;
-    let undamped = |coefficient: f64, stiffness: f64| coefficient * h / (stiffness / density).sqrt();
-    let longest = undamped(DRAINED_COEFFICIENT, skeleton_stiffness);
-    let rate = rayleigh.map_or(0.0, |damping| damping.rate(2.0 / longest));
-    let braked = VISCOSITY_RATIO * viscosity;
-    let filter = filter_ratio(model) * filtered / response.sqrt() + braked;
-    let viscous = |limit: f64| 0.25 * rate * limit;
-    let wave = |coefficient: f64, stiffness: f64, criterion: Criterion| {
-        let limit = undamped(coefficient, stiffness);
-        let ratio = viscous(limit);
-        let named = if ratio > VISCOUS_RATIO { Criterion::Damping } else { criterion };
-        TimeLimit { dt: limit * left_by_damping(filter + ratio), criterion: named }
-    };
-    let drained = wave(DRAINED_COEFFICIENT, skeleton_stiffness, Criterion::DrainedWave);
-    if coupling == PressureCoupling::None {
+    let waves = RegionWaves::new(model, region, skeleton_stiffness, limits);
+    let drained = waves.drained();
+    if limits.coupling == PressureCoupling::None {
         return drained;
     }
-    let water = model.water_stiffness(model.regions[region].porosity);
-    let diffusivity = model.pressure_diffusivity(region, |k| k.major);
-    let coefficient =
-        if diffusivity > 0.0 && surface_is_tied { UNDRAINED_COEFFICIENT } else { FREE_UNDRAINED_COEFFICIENT };
-    let undrained = wave(coefficient, skeleton_stiffness + water, Criterion::UndrainedWave);
-    let combined = drained.least(undrained);
-    if diffusivity == 0.0 {
-        return combined;
+    let of_waves = drained.least(waves.undrained());
+    if waves.largest_diffusivity() == 0.0 {
+        return of_waves;
     }
-    if coupling == PressureCoupling::Explicit {
-        let area = model.spacing.x.min(model.spacing.y).powi(2);
-        let diffusion = DIFFUSION_COEFFICIENT * area / diffusivity;
-        let dt = (combined.dt.powi(-2) + diffusion.powi(-2)).powf(-0.5);
-        let criterion = if diffusion < combined.dt { Criterion::Diffusion } else { combined.criterion };
-        return TimeLimit { dt, criterion };
+    match limits.coupling {
+        PressureCoupling::Explicit => waves.with_explicit_diffusion(of_waves),
+        _ => waves.with_implicit_diffusion(of_waves),
     }
-    let left = left_by_damping(filter + viscous(longest));
-    // Across the grain the water drains last.
-    let left_open = if surface_is_tied { 1.0 } else { FREE_SURFACE_DRAINAGE };
-    let diffusivity = left_open * model.pressure_diffusivity(region, |k| k.minor);
-    // Water that drains at grid scale within a step stiffens the short waves no more.
-    let at_edge = (UNDRAINED_COEFFICIENT / coefficient).powi(2);
-    let stable = |dt: f64| {
-        let share = spectrum.share(at_edge * water / density, diffusivity, dt / left);
-        (dt / drained.dt).powi(2) + share <= 1.0
-    };
-    let (mut low, mut high) = (combined.dt.min(drained.dt), drained.dt);
-    if !stable(low) {
-        return combined;
-    }
-    for _ in 0..BISECTIONS {
-        let middle = 0.5 * (low + high);
-        if stable(middle) { low = middle } else { high = middle }
-    }
-    let criterion = if low > 0.99 * drained.dt { drained.criterion } else { Criterion::DrainingWave };
-    TimeLimit { dt: low, criterion }
 }

@@ -1,19 +1,20 @@
-//! Where the energy of a shaken section goes, and how much of each phase there is.
+//! Energy balance of a moving section, and the masses of its phases.
 //!
-//! Works are those of the leapfrog's own steps: a force does `f (v_before + v_after)/2 dt`, so that all of them together
-//! are exactly what kinetic energy gains. Stress does its work at the stress nodes, half of every strain increment with
-//! the stress before it and half with the one after: summed by parts that is the work of its nodal forces, to the second
-//! order in the strain of a step. What the skeleton's forces take beyond it is what damping takes.
+//! The work of a force in a leapfrog step is `f (v_before + v_after)/2 dt`, so that the work of all forces is
+//! exactly the gain of kinetic energy. The work of stress is summed at the stress nodes, half of every strain
+//! increment with the stress before it and half with the stress after it. Summed by parts this is the work of
+//! its nodal forces, to second order in the strain of a step. Damping takes the rest of the work of the
+//! skeleton's forces.
 //!
-//! A step costs no loop of its own: constant forces and water do half their work where the next step reads the velocity
-//! between both, and motion is looked at where a sample is taken.
+//! No loop is added to a step: half of the work of constant forces and water is added in the next step, which
+//! reads the velocity between both steps. Kinetic energy is computed only when a sample is taken.
 
 use crate::{
     run::forces::Power,
     skeleton::{phases::Phases, soils::StressWork},
 };
 
-/// Names of the columns of a history of energy, in order; masses are Mg/m, all else is kJ/m.
+/// Names of the columns of a history of energy, in order; masses are in Mg/m, all others in kJ/m.
 pub const ENERGY_NAMES: [&str; 15] = [
     "kinetic",
     "stress",
@@ -32,27 +33,29 @@ pub const ENERGY_NAMES: [&str; 15] = [
     "water_mass",
 ];
 
-/// Energy of a section in a stage, kJ/m; works count from its beginning.
+/// Energy of a section in a stage, kJ/m; work counts from its beginning.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Energy {
-    /// Of the motion at the beginning.
+    /// Kinetic energy at the beginning.
     kinetic_before: f64,
-    /// Done on the soil by its effective stress, all of the last strain increment included: stored, or taken by plasticity.
+    /// Work of the effective stress on the soil, with the whole last strain increment: stored, or taken by
+    /// plasticity.
     stress: f64,
-    /// Given to the pore water beyond its state at rest.
+    /// Work on the pore water beyond its state at rest.
     water: f64,
     /// Taken by local damping.
     local_damping: f64,
-    /// Done by the constant forces.
+    /// Work of the constant forces.
     constant: ConstantWork,
-    /// Brought in by the base's dashpots.
+    /// Work of the base's dashpots on the section.
     base: f64,
-    /// Brought in by free-field sides, also through the strain that the columns' motion gives.
+    /// Work of free-field sides on the section, also through the strain by the columns' motion.
     sides: f64,
     /// Kinetic energy gained by masses that a renewed geometry has changed.
     renewal: f64,
-    /// Length of the last step while constant forces and water still owe it half their work, s; else zero.
-    owed: f64,
+    /// Length of the last step while half of its work of constant forces and water is not yet added, s; else
+    /// zero.
+    unfinished_step: f64,
 }
 
 /// Work of the constant forces by origin, kJ/m.
@@ -75,7 +78,7 @@ impl ConstantWork {
         self.load += time * power.load;
     }
 
-    /// Of the reaction: what no other part does.
+    /// Of the reaction: the total less all other parts.
     fn reaction(&self) -> f64 {
         self.total - self.weight - self.still_water - self.renewal - self.load
     }
@@ -93,23 +96,24 @@ pub struct EdgeWork {
 }
 
 impl Energy {
-    /// Nothing done yet at a kinetic energy, kJ/m.
+    /// No work yet, at a kinetic energy, kJ/m.
     pub fn new(kinetic: f64) -> Self {
         Self { kinetic_before: kinetic, ..Self::default() }
     }
 
-    /// Adds the half of the last step's work that is still owed: the power of its forces on the velocity that it left.
+    /// Adds the second half of the last step's work: the power of its forces on the velocity at its end.
     pub fn end_step(&mut self, last: &Power) {
-        self.constant.add(last, 0.5 * self.owed);
-        self.water -= 0.5 * self.owed * last.water;
-        self.owed = 0.0;
+        self.constant.add(last, 0.5 * self.unfinished_step);
+        self.water -= 0.5 * self.unfinished_step * last.water;
+        self.unfinished_step = 0.0;
     }
 
-    /// Adds half of a step's work, over `dt` in s: the power of its forces on the velocity at its beginning.
+    /// Adds the first half of a step's work, over `dt` in s: the power of its forces on the velocity at its
+    /// beginning.
     pub fn begin_step(&mut self, dt: f64, power: &Power) {
         self.constant.add(power, 0.5 * dt);
         self.water -= 0.5 * dt * power.water;
-        self.owed = dt;
+        self.unfinished_step = dt;
     }
 
     /// Adds the work of edges and local damping in a step.
@@ -119,7 +123,7 @@ impl Energy {
         self.local_damping += work.local_damping;
     }
 
-    /// Adds the kinetic energy that a renewal of the geometry gave, kJ/m.
+    /// Adds the kinetic energy gained in a renewal of the geometry, kJ/m.
     pub fn renew(&mut self, gained: f64) {
         self.renewal += gained;
     }
@@ -129,19 +133,19 @@ impl Energy {
         self.stress += work.mean;
     }
 
-    /// The columns of [`ENERGY_NAMES`] but the masses, from the kinetic energy and the work of the stress `after` the last
-    /// strain increment in it, kJ/m. What the forces of stress, velocity filter and Rayleigh damping have taken is the
-    /// remainder.
+    /// The columns of [`ENERGY_NAMES`] without the masses, from the kinetic energy and the work of the stress
+    /// `after` the last strain increment in this increment, kJ/m. The energy taken by velocity filter and
+    /// Rayleigh damping is the remainder.
     fn columns(&self, kinetic: f64, after: f64) -> [f64; 13] {
         // Half of the last increment, with the stress after it, belongs to the next step's force.
         let stress = self.stress - 0.5 * after;
-        let given = self.constant.total + self.base + self.sides + self.renewal;
-        let held = (kinetic - self.kinetic_before) + self.water + self.local_damping;
+        let supplied = self.constant.total + self.base + self.sides + self.renewal;
+        let stored = (kinetic - self.kinetic_before) + self.water + self.local_damping;
         [
             kinetic,
             stress,
             self.water,
-            given - held - stress,
+            supplied - stored - stress,
             self.local_damping,
             self.constant.weight,
             self.constant.still_water,
@@ -175,8 +179,8 @@ impl EnergyHistory {
         time >= self.next as f64 * self.interval
     }
 
-    /// Takes a sample at the end of a step, `time` in s, from the kinetic energy and the work of the stress `after` the step
-    /// in its strain, kJ/m.
+    /// Takes a sample at the end of a step, `time` in s, from the kinetic energy and the work of the stress
+    /// `after` the step in the strain of the step, kJ/m.
     pub fn push(&mut self, time: f64, energy: &Energy, kinetic: f64, after: f64, phases: &Phases) {
         while self.is_due(time) {
             self.next += 1;

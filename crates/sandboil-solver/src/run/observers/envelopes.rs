@@ -5,14 +5,14 @@ use crate::{run::ground::Ground, skeleton::point::maximum_shear_strain, stages::
 /// Envelopes of a stage; every step counts.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Envelopes {
-    /// Largest excess pore pressure of every node, kPa, if it is kept.
+    /// Largest excess pore pressure of every node, kPa, if it is recorded.
     pub pressure: Option<Vec<f64>>,
-    /// Largest engineering shear strain of every stress node, if it is kept.
+    /// Largest engineering shear strain of every stress node, if it is recorded.
     pub strain: Option<Vec<f64>>,
 }
 
 impl Envelopes {
-    /// Those that a stage asks for.
+    /// The envelopes of a stage.
     pub fn new(ground: &Ground, output: &Output) -> Self {
         let is_wet = ground.water.is_some();
         Self {
@@ -21,7 +21,7 @@ impl Envelopes {
         }
     }
 
-    /// Takes over the present values.
+    /// Updates the envelopes with the present values.
     pub fn record(&mut self, ground: &Ground) {
         if let (Some(envelope), Some(flow)) = (&mut self.pressure, &ground.water) {
             for (node, largest) in envelope.iter_mut().enumerate() {

@@ -1,5 +1,5 @@
 //! Histories at points: every step enters a low-pass filter, and the filtered signal is thinned to the output
-//! interval, so that thinning folds no high frequency back.
+//! interval, so that thinning causes no aliasing.
 
 use crate::{
     run::{clock::Clock, ground::Ground},
@@ -14,7 +14,7 @@ use std::{collections::VecDeque, f64::consts::PI};
 const HALF_WIDTH: f64 = 4.0;
 /// Cut-off over the output rate: 6 dB down at 80 Hz for 0.005 s, 0.7 dB at 48 Hz.
 const CUT_OFF: f64 = 0.4;
-/// Least number of steps in an output interval; the interval widens until it holds them.
+/// Least number of steps in an output interval; a shorter interval is widened.
 const FEWEST_STEPS: f64 = 2.0;
 /// Blackman-windowed sinc at a distance from the output instant, in output intervals.
 fn filter_weight(distance: f64) -> f64 {
@@ -33,9 +33,9 @@ fn filter_weight(distance: f64) -> f64 {
 pub struct Histories {
     /// Weights of the velocity nodes: rows are probes.
     of_nodes: Csr<f64>,
-    /// Weights of the stress nodes: rows are probes; empty unless they are read.
+    /// Weights of the stress nodes: rows are probes; `None` without stress histories.
     of_stress: Option<Csr<f64>>,
-    recorder: Recorder,
+    recorder: LowPassRecorder,
     sample: Vec<f64>,
 }
 
@@ -50,7 +50,7 @@ impl Histories {
         Self {
             of_nodes: point_weights(model, position, &output.probes),
             of_stress,
-            recorder: Recorder::new(channels, output.history_interval, dt),
+            recorder: LowPassRecorder::new(channels, output.history_interval, dt),
             sample: vec![0.0; channels],
         }
     }
@@ -60,8 +60,8 @@ impl Histories {
         channel_names(ground.water.is_some(), self.of_stress.is_some())
     }
 
-    /// Takes a sample of a step whose accelerations are known and whose nodes have not moved: all quantities belong to
-    /// the same instant.
+    /// Takes a sample of a step, after its accelerations are known and before its nodes move: all quantities
+    /// are those of the same instant.
     pub fn record(&mut self, ground: &Ground, clock: &Clock) {
         let Ground { model, position, velocity, acceleration, water, points, .. } = ground;
         let mut slot = 0;
@@ -100,7 +100,7 @@ impl Histories {
         self.recorder.push(clock.time, clock.dt, &self.sample);
     }
 
-    /// Closes the samples still collecting, at the end of the stage or of the run, `time` in s.
+    /// Completes the open samples at the end of the stage or of the run, `time` in s.
     pub fn finish(&mut self, time: f64) {
         self.recorder.finish(time);
     }
@@ -131,10 +131,10 @@ fn channel_names(water: bool, stress: bool) -> Vec<&'static str> {
 
 /// Filtered, thinned samples of a fixed set of channels.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
-pub struct Recorder {
+pub struct LowPassRecorder {
     interval: f64,
     channels: usize,
-    /// Samples still collecting: index, sum of weights, weighted values.
+    /// Open samples: index, sum of weights, weighted sums of the values.
     open: VecDeque<(u64, f64, Vec<f64>)>,
     spare: Vec<Vec<f64>>,
     next: u64,
@@ -142,7 +142,7 @@ pub struct Recorder {
     values: Vec<f64>,
 }
 
-impl Recorder {
+impl LowPassRecorder {
     /// A recorder of `channels` values each step, thinned to `interval` seconds (or to [`FEWEST_STEPS`] steps).
     pub fn new(channels: usize, interval: f64, dt: f64) -> Self {
         Self {
@@ -187,7 +187,7 @@ impl Recorder {
         }
     }
 
-    /// Closes the samples up to `time`, the end of the stage; one-sided windows are normalised.
+    /// Completes the samples up to `time`, the end of the stage; one-sided windows are normalised.
     pub fn finish(&mut self, time: f64) {
         while self.open.front().is_some_and(|&(sample, ..)| sample as f64 * self.interval <= time) {
             self.close_front();
@@ -207,7 +207,7 @@ mod tests {
 
     fn recorded(frequency: f64) -> (Vec<f64>, Vec<f64>) {
         let (dt, interval) = (4e-4, 0.005);
-        let mut recorder = Recorder::new(1, interval, dt);
+        let mut recorder = LowPassRecorder::new(1, interval, dt);
         for step in 0..5000 {
             let time = f64::from(step) * dt;
             recorder.push(time, dt, &[(2.0 * PI * frequency * time).cos()]);
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn passes_what_engineers_read_without_shift() {
+    fn low_frequencies_pass_without_phase_shift() {
         for frequency in [0.5, 5.0, 10.0, 25.0] {
             let (times, values) = recorded(frequency);
             assert!((times[1] - 0.005).abs() < 1e-15);
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn stops_what_would_fold_back() {
+    fn frequencies_that_would_alias_are_stopped() {
         for frequency in [160.0, 210.0, 390.0] {
             let (_, values) = recorded(frequency);
             let worst = values.iter().skip(8).take(380).fold(0.0_f64, |a, v| a.max(v.abs()));

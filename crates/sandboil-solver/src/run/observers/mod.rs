@@ -1,5 +1,5 @@
-//! What a stage records. Each observer is called at two fixed points of a step: once accelerations are known and nothing
-//! has moved, and at its end.
+//! Histories, envelopes and energy of a stage. Observers are called at fixed points of a step: after the
+//! accelerations are known and before the nodes move, and at its end.
 
 pub mod energy;
 pub mod envelopes;
@@ -21,13 +21,13 @@ pub struct Observers {
     pub histories: Histories,
     /// Envelopes.
     pub envelopes: Envelopes,
-    /// Samples of the accounts of energy.
+    /// Samples of the energy balance.
     pub energy_history: EnergyHistory,
     energy: Energy,
 }
 
 impl Observers {
-    /// Those that a stage asks for; `dt` is its first time step, s.
+    /// The observers of a stage; `dt` is its first time step, s.
     pub fn new(ground: &Ground, output: &Output, dt: f64) -> Self {
         Self {
             histories: Histories::new(ground, output, dt),
@@ -37,26 +37,27 @@ impl Observers {
         }
     }
 
-    /// Accounts for the power of the step's forces on the velocity at its beginning (kW/m), and of the water's force in the
-    /// step before on the same velocity.
+    /// Adds the work of forces, from the power of the step's forces on the velocity at its beginning (kW/m),
+    /// and of the water's force in the step before on the same velocity.
     pub fn account_forces(&mut self, dt: f64, power: &Power, last_water_power: f64) {
         self.energy.end_step(&Power { water: last_water_power, ..*power });
         self.energy.begin_step(dt, power);
     }
 
-    /// Once accelerations are known and nothing has moved.
+    /// Takes samples after the accelerations are known and before the nodes move.
     pub fn record(&mut self, ground: &Ground, clock: &Clock, work: &EdgeWork) {
         self.energy.step(work);
         self.envelopes.record(ground);
         self.histories.record(ground, clock);
     }
 
-    /// Accounts for the work of stress in the step's strain.
+    /// Adds the work of stress in the step's strain.
     pub fn account_strain(&mut self, work: StressWork) {
         self.energy.strain(work);
     }
 
-    /// At the end of a step: a sample of energy if one `is_due`, and the last histories if the stage `is_over`.
+    /// At the end of a step: takes a sample of energy if one `is_due`, and completes the histories if the
+    /// stage `is_over`.
     pub fn end_step(&mut self, domain: &Domain, after: f64, is_due: bool, is_over: bool) {
         let Domain { ground, clock, .. } = domain;
         if is_due {
@@ -70,12 +71,12 @@ impl Observers {
         }
     }
 
-    /// Before a renewal of the geometry: closes the work of forces that the renewal changes.
+    /// Before a renewal of the geometry: completes the work of forces that the renewal changes.
     pub fn begin_renewal(&mut self, domain: &Domain) {
         self.energy.end_step(&domain.present_power());
     }
 
-    /// After a renewal: the kinetic energy that it gave, kJ/m.
+    /// After a renewal: adds the kinetic energy `gained` in it, kJ/m.
     pub fn end_renewal(&mut self, gained: f64) {
         self.energy.renew(gained);
     }
