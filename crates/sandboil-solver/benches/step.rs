@@ -1,7 +1,7 @@
-//! What a step costs, and what building a geometry costs, per node on one thread and on two.
+//! Cost of a step and of building a geometry, per node on one thread and on two.
 //!
-//! The table compares machines: each figure also in yardsticks (one exponential, one power and one square root),
-//! timed in turn with it.
+//! For a comparison of machines each figure is also given in yardsticks (one exponential, one power and one
+//! square root), timed in alternation with it.
 #![allow(clippy::unwrap_used)] // a failure ends the bench
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // row counts of small columns
 
@@ -23,12 +23,12 @@ const WATER: Water = Water { unit_weight: 10.0, bulk_modulus: 1e6 };
 /// Height over spacing of the blocks.
 const ROWS: usize = 100;
 const SPACING: f64 = 0.2;
-/// Gravity steps before a block of sand is shaken: near enough to rest for a bench.
+/// Gravity steps before a block of sand is shaken: for a bench it is then near enough to rest.
 const RELAXATION: u64 = 300;
-/// Steps into the shaking before the clock runs: the wave has then crossed the block.
+/// Steps of shaking before the timing starts: the wave has then crossed the block.
 const LEAD: u64 = 2000;
 
-/// What is stepped: elastic ground, dry or saturated, and sand on its way to liquefaction.
+/// The ground: elastic, dry or saturated, or sand close to liquefaction.
 #[derive(Debug, Clone, Copy)]
 enum Ground {
     Dry,
@@ -48,7 +48,7 @@ fn model(ground: Ground, columns: usize) -> Model {
     column(height, SPACING, columns, region, water)
 }
 
-/// A simulation under way, shaken by 0.2 m/s at 2 Hz.
+/// A running simulation, shaken by 0.2 m/s at 2 Hz.
 fn under_way(ground: Ground, columns: usize, threads: usize) -> Simulation {
     let mut simulation = Simulation::new(&model(ground, columns), threads).unwrap();
     simulation.begin(Gravity { tolerance: 1e-4, max_steps: 20_000 }).unwrap();
@@ -67,7 +67,7 @@ const CASES: [(&str, Ground, usize); 4] = [
     ("liquefying sand", Ground::Sand, 5),
 ];
 
-/// What free-field sides add to a step of a section of 20,000 nodes, beside the same between rigid walls.
+/// Cost of free-field sides in a step of a section of 20,000 nodes, compared with rigid walls.
 #[expect(clippy::print_stdout, reason = "a bench reports")]
 fn free_field_beside_walls() {
     const COLUMNS: usize = 200;
@@ -87,7 +87,7 @@ fn free_field_beside_walls() {
                 simulation.begin(stage).unwrap();
                 simulation
             });
-            // The least of several rounds in turn: what else the machine does only adds.
+            // The shortest of several rounds: other work of the machine only adds time.
             let mut least = [f64::INFINITY; 2];
             for _ in 0..ROUNDS {
                 for (simulation, least) in both.iter_mut().zip(&mut least) {

@@ -1,8 +1,8 @@
-//! Steps take no memory: what they need is made when a stage begins.
+//! Steps allocate no memory: their arrays are made when a stage begins.
 #![allow(clippy::unwrap_used)] // a failure is the test's own report
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // row counts of small columns
 
-#[allow(dead_code, unused_imports)] // of what other tests build this one needs a part
+#[allow(dead_code, unused_imports)] // only a part of the shared helpers is used here
 #[path = "validation/common.rs"]
 mod common;
 
@@ -20,9 +20,9 @@ use sandboil_solver::{
 const WATER: Water = Water { unit_weight: 10.0, bulk_modulus: 1e6 };
 const WIDTH: f64 = 0.6;
 const HEIGHT: f64 = 6.0;
-/// Steps after which the stage has made what it makes at its beginning.
+/// Steps after which all arrays of the stage have been made.
 const LEAD: u64 = 40;
-/// Steps that are counted: several looks at the stability limit among them.
+/// Steps in which allocations are counted; they include several checks of the stability limit.
 const COUNTED: u64 = 64;
 
 fn sand(diffusion: Diffusion) -> Model {
@@ -38,7 +38,7 @@ fn sand(diffusion: Diffusion) -> Model {
 fn stage() -> Shaking {
     let velocity = (0..2000).map(|k| 0.05 * (0.02 * f64::from(k)).sin()).collect();
     let stage = shaking(Some(UpgoingWave::shear(1e-3, velocity)), 10.0, vec![Vec2::new(0.3, 5.0)]);
-    // Finished samples wait to be taken: none is finished while steps are counted.
+    // Finished samples are stored: with this interval none is finished in the counted steps.
     let output = Output { history_interval: 1.0, ..stage.output };
     Shaking { output, ..stage }
 }
@@ -56,7 +56,7 @@ fn allocations(model: &Model, stage: Shaking) -> u64 {
 }
 
 #[test]
-fn steps_take_no_memory() {
+fn steps_allocate_no_memory() {
     let drain = MovingBoundary {
         boundary: HydraulicBoundary {
             line: vec![Vec2::new(0.0, 3.0), Vec2::new(WIDTH, 3.0)],

@@ -1,4 +1,4 @@
-//! Columns that several test files build.
+//! Columns that several test files use.
 
 use sandboil_soil::{Integrator, Soil, elastic::Elastic};
 use sandboil_solver::{

@@ -9,7 +9,7 @@ const HEIGHT: f64 = 1.0;
 const SHEAR: f64 = 3.0e3;
 const BULK: f64 = 6.0e3;
 const UNIT_WEIGHT: f64 = 10.0;
-/// Slow enough that the column's inertia does not show: the wave crosses it 400 times before T = 0.05.
+/// Slow enough that the column's inertia has no effect: a wave crosses it 400 times before T = 0.05.
 const CONDUCTIVITY: f64 = 1e-4;
 const LOAD: f64 = 1.0;
 
@@ -64,12 +64,12 @@ fn terzaghi() {
     }
 }
 
-/// The smooth, impermeable layer of depth [`HEIGHT`] under a load `LOAD cos(k x)`, drained at its surface, with
-/// Poisson's ratio zero: what Mandel and Cryer found, pressure that first rises inside.
+/// The smooth, impermeable layer of depth [`HEIGHT`] under a load `LOAD cos(k x)`, drained at its surface,
+/// with Poisson's ratio zero: the effect of Mandel and Cryer, pressure that first increases inside.
 mod waves_of_load {
     use super::*;
 
-    /// Length of the load's waves.
+    /// Wavelength of the load.
     const WAVE: f64 = 2.5 * HEIGHT;
     const NUMBER: f64 = 2.0 * PI / WAVE;
     const BULK: f64 = 2.0 / 3.0 * SHEAR;
@@ -80,15 +80,16 @@ mod waves_of_load {
     /// Time factors `c_v t / H^2` at which pressure is compared: the base's peak among them.
     const TIME_FACTORS: [f64; 7] = [0.01, 0.02, 0.04, 0.06, 0.08, 0.12, 0.2];
 
-    /// Excess pressure under a crest at once after loading, soil and water incompressible: Stokes' problem of the layer.
-    fn at_once(height: f64) -> f64 {
+    /// Excess pressure under a crest immediately after loading, with incompressible soil and water: Stokes'
+    /// problem of the layer.
+    fn initial_pressure(height: f64) -> f64 {
         let depth = NUMBER * HEIGHT;
         LOAD * depth.sinh() * (NUMBER * height).cosh() / (depth.sinh() * depth.cosh() + depth)
     }
 
-    /// Quadratic displacement `u sin(k x)`, `v cos(k x)` and linear pressure `p cos(k x)` over the height: Biot's equations
-    /// in finite elements, backward Euler with steps so small that neither shows. Pressure at evenly spaced
-    /// heights at every one of [`TIME_FACTORS`].
+    /// Quadratic displacement `u sin(k x)`, `v cos(k x)` and linear pressure `p cos(k x)` over the height:
+    /// Biot's equations in finite elements, with backward Euler; element size and step are so small that
+    /// their errors are negligible. Pressure at evenly spaced heights for each of [`TIME_FACTORS`].
     fn finite_elements() -> Vec<Vec<f64>> {
         const ELEMENTS: usize = 40;
         const STEPS: usize = 200;
@@ -140,7 +141,7 @@ mod waves_of_load {
         let held = [points, size - 1];
         let mut start = DVector::zeros(size);
         for i in 0..=ELEMENTS {
-            start[2 * points + i] = at_once(i as f64 * element);
+            start[2 * points + i] = initial_pressure(i as f64 * element);
         }
         let load = &coupling * &start;
         let (mut now, mut time) = (start, 0.0);
@@ -176,8 +177,8 @@ mod waves_of_load {
         values[below] * (1.0 - share) + values[below + 1] * share
     }
 
-    /// At every one of [`TIME_FACTORS`]: root mean square over the nodes of excess pressure less the reference, over the
-    /// largest at the start, and the pressure of the lowest row over its own start, found and of the reference.
+    /// For each of [`TIME_FACTORS`]: root mean square error of excess pressure over the largest initial
+    /// pressure, and the pressure of the lowest row over its initial value, computed and reference.
     fn compare(rows: usize, reference: &[Vec<f64>]) -> Vec<[f64; 3]> {
         let spacing = HEIGHT / rows as f64;
         let columns = (WAVE / spacing).round() as usize;
@@ -192,17 +193,17 @@ mod waves_of_load {
         let lowest = model.position[0].y;
         let mut simulation = Simulation::new(&model, 1).unwrap();
         simulation.begin(shaking(None, 1e3, Vec::new())).unwrap();
-        simulation.set_excess_pore_pressure(&field(&at_once)).unwrap();
+        simulation.set_excess_pore_pressure(&field(&initial_pressure)).unwrap();
         let mut compared = Vec::new();
         for (factor, reference) in TIME_FACTORS.iter().zip(reference) {
             simulation.advance(u64::MAX, factor * HEIGHT * HEIGHT / (MOBILITY * CONFINED)).unwrap();
             let (found, exact) =
                 (simulation.excess_pore_pressure().unwrap(), field(&|y| between(reference, y)));
             let squares: f64 = found.iter().zip(&exact).map(|(p, exact)| (p - exact).powi(2)).sum();
-            let error = (squares / found.len() as f64).sqrt() / at_once(HEIGHT);
+            let error = (squares / found.len() as f64).sqrt() / initial_pressure(HEIGHT);
             let amplitude =
                 (0..columns).map(|node| found[node] * wave(node)).sum::<f64>() * 2.0 / columns as f64;
-            let [rise, exact] = [amplitude, between(reference, lowest)].map(|p| p / at_once(lowest));
+            let [rise, exact] = [amplitude, between(reference, lowest)].map(|p| p / initial_pressure(lowest));
             compared.push([error, rise, exact]);
         }
         compared
@@ -228,8 +229,8 @@ mod waves_of_load {
     }
 }
 
-/// Pore pressure of a weightless undrained block over the total stress that presses it: by the confined modulus when it
-/// is pressed one way, by `K + G/3` when it is pressed from both sides in plane strain.
+/// Pore pressure of a weightless undrained block over the total stress on it: by the confined modulus under
+/// stress in one direction, by `K + G/3` under equal stress in both directions in plane strain.
 #[test]
 fn undrained_block() {
     const SIDE: usize = 11;

@@ -1,4 +1,4 @@
-//! Free-field sides: they hold still, move the section as the column moves, and let waves out.
+//! Free-field sides: they stay at rest, move the section as the column moves, and let waves leave.
 
 use crate::{
     common::{column, elastic, shaking},
@@ -36,9 +36,9 @@ fn on_free_field(stage: Shaking) -> Shaking {
     Shaking { free_field: [true, true], ..stage }
 }
 
-/// A block between free-field sides moves as its column does, everywhere and at every time.
+/// A block between free-field sides moves as its column, everywhere and at every time.
 #[test]
-fn a_block_follows_its_column() {
+fn a_block_moves_as_its_column() {
     for (what, water, conductivity) in
         [("dry", None, 0.0), ("undrained", Some(WATER), 0.0), ("draining", Some(WATER), 1e-3)]
     {
@@ -82,9 +82,10 @@ fn recorded(stage: &Shaking, interval: f64) -> Shaking {
     stage
 }
 
-/// A column read from the record of an earlier run moves the block as the solved one did, to the interval's curvature.
+/// A column that is read from the record of an earlier run moves the block as the computed column, up to the
+/// interpolation error of the interval.
 #[test]
-fn a_recorded_column_does_what_the_solved_one_did() {
+fn a_recorded_column_acts_as_the_computed_one() {
     const INTERVAL: f64 = 2.5e-3;
     let mut region = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
     region.hydraulic_conductivity = Conductivity::isotropic(1e-3);
@@ -112,7 +113,7 @@ fn a_recorded_column_does_what_the_solved_one_did() {
             apart = apart.max((now[0] - then[0]).hypot(now[1] - then[1]));
         }
     }
-    // A second stage reads its own record, and is refused without.
+    // A second stage reads its own record, and is refused without one.
     let again = Shaking { base: Base::shaken_by(Some(pulse(5.0, -0.1))), ..stage.clone() };
     solved.begin(recorded(&again, INTERVAL)).unwrap();
     solved.advance(u64::MAX, f64::INFINITY).unwrap();
@@ -130,10 +131,10 @@ fn a_recorded_column_does_what_the_solved_one_did() {
     assert!(apart < 0.005 * peak, "{apart} {peak}");
 }
 
-/// One stage of shaking or the same in two: between the stages, and where the geometry is renewed under way, what the
-/// columns push by then stays.
+/// The same shaking in one stage or in two: the forces of the columns are continuous between the stages and
+/// at renewals of the geometry.
 #[test]
-fn stages_and_renewals_strike_no_blow() {
+fn stages_and_renewals_cause_no_shock() {
     const INTERVAL: f64 = 1e-3;
     const HALF: f64 = 0.25;
     let shake = |from: f64| {
@@ -172,15 +173,16 @@ fn stages_and_renewals_strike_no_blow() {
     }
 }
 
-/// A column that runs away drives the section: it is told, with its node, before anybody can read or keep the state.
+/// A diverged column drives the section: the error, with the column's node, is returned before the state can
+/// be read or stored.
 #[test]
-fn a_column_that_runs_away_is_told_when_the_step_returns() {
+fn a_diverged_column_is_reported_when_the_step_returns() {
     let soil = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
     let mut section = at_rest(&block(HEIGHT, SPACING, 3, soil, None));
     let wave = UpgoingWave::shear(1e-3, vec![1e9; 1000]);
     section.begin(on_free_field(shaking(Some(wave), 0.8, Vec::new()))).unwrap();
     let Err(SolverError::Column { side: "left", source }) = section.advance(1, f64::INFINITY) else {
-        panic!("no word of the column")
+        panic!("not an error of the column")
     };
     assert!(matches!(*source, SolverError::Diverged { quantity: "velocity", node: 0, .. }), "{source}");
 }

@@ -1,4 +1,4 @@
-//! Waves that leave: how much of them base and sides send back.
+//! Reflection of outgoing waves by base and sides.
 
 use crate::{
     common::{elastic, shaking},
@@ -13,7 +13,7 @@ const SHEAR_SPEED: f64 = 100.0;
 const SHEAR_MODULUS: f64 = DENSITY * SHEAR_SPEED * SHEAR_SPEED;
 const BULK_MODULUS: f64 = 2.0 * SHEAR_MODULUS;
 const WATER: Water = Water { unit_weight: 10.0, bulk_modulus: 1e6 };
-/// Half-width of the pulses over the spacing: hardly a wave of fewer than 18 spacings in them.
+/// Half-width of the pulses over the spacing: they contain almost no waves shorter than 18 spacings.
 const PULSE: f64 = 8.0;
 
 fn speed(model: &Model, compression: bool) -> f64 {
@@ -26,8 +26,8 @@ fn speed(model: &Model, compression: bool) -> f64 {
     (stiffness / model.mixture_density(0)).sqrt()
 }
 
-/// Weightless ground whose every edge absorbs, with a velocity field to begin with.
-fn under_way(model: &Model, velocity: impl Fn(Vec2) -> Vec2, probes: Vec<Vec2>) -> Simulation {
+/// Weightless ground with absorbing edges on all sides and an initial velocity field.
+fn with_initial_velocity(model: &Model, velocity: impl Fn(Vec2) -> Vec2, probes: Vec<Vec2>) -> Simulation {
     let mut simulation = Simulation::new(model, 2).unwrap();
     let mut stage = Shaking { free_field: [true; 2], ..shaking(None, 10.0, probes) };
     stage.base.vertical = Vertical::Absorbing;
@@ -37,7 +37,7 @@ fn under_way(model: &Model, velocity: impl Fn(Vec2) -> Vec2, probes: Vec<Vec2>) 
     simulation
 }
 
-/// Pulses that run out to both sides at normal incidence: what comes back past a point half-way, over what went out.
+/// Pulses that run to both sides at normal incidence: the reflection at a point half-way, over the pulse.
 #[test]
 fn sides_absorb_waves_at_normal_incidence() {
     const SPACING: f64 = 0.25;
@@ -50,13 +50,14 @@ fn sides_absorb_waves_at_normal_incidence() {
         let region = elastic(SHEAR_MODULUS, BULK_MODULUS);
         let dry = weightless(block(1.0, SPACING, 1, region.clone(), water));
         let (c, fastest) = (speed(&dry, compression), speed(&dry, true));
-        // Tall enough that what the ends of the pulse scatter is not yet at the middle.
+        // Tall enough that waves scattered at the ends of the pulse do not reach the middle.
         let height = 2.0 * SPACING * ((0.9 * WIDTH + 2.0 * PULSE * SPACING) * fastest / c / SPACING).ceil();
         let columns = (WIDTH / SPACING).round() as usize;
         let model = weightless(block(height, SPACING, columns, region, water));
         let direction = if compression { Vec2::x() } else { Vec2::y() };
         let shape = |x: Vec2| direction * (-((x.x - 0.5 * WIDTH) / (PULSE * SPACING)).powi(2)).exp();
-        let mut simulation = under_way(&model, shape, vec![Vec2::new(0.25 * WIDTH, 0.5 * height)]);
+        let mut simulation =
+            with_initial_velocity(&model, shape, vec![Vec2::new(0.25 * WIDTH, 0.5 * height)]);
         simulation.advance(u64::MAX, 0.9 * WIDTH / c).unwrap();
         simulation.finish_histories();
         let (times, values) = simulation.take_histories();
@@ -70,21 +71,22 @@ fn sides_absorb_waves_at_normal_incidence() {
         };
         // The pulse passes at a quarter of the width, its reflection at three quarters.
         let (out, back) = (largest(0.0, 0.5), largest(0.6, 0.9));
-        println!("{what}: {:.2} % of {out:.3} come back, {} nodes", 100.0 * back / out, model.nodes());
+        println!("{what}: {:.2} % of {out:.3} reflected, {} nodes", 100.0 * back / out, model.nodes());
         assert!((out - 0.5).abs() < 0.02, "{out}");
         assert!(back < bound * out, "{back} {out}");
     }
 }
 
-/// Beams that meet the sides at 45 degrees: the amplitude that stays in the section. Dashpots are made for normal
-/// incidence; on plane waves theirs send back 7.0 % of P and 17.1 % of S here, converted waves included.
+/// Beams that meet the sides at 45 degrees: the amplitude that stays in the section. Dashpots are exact for
+/// normal incidence; here they reflect 7.0 % of plane P waves and 17.1 % of plane S waves, converted waves
+/// included.
 #[test]
 #[ignore = "half a minute"]
 fn sides_at_45_degrees() {
     const SPACING: f64 = 0.25;
     const WIDTH: f64 = 40.0;
     const HEIGHT: f64 = 160.0;
-    // Several wavelengths wide, so that little of the beam runs in other directions.
+    // Several wavelengths wide, so that little of the beam travels in other directions.
     const BEAM: f64 = 16.0;
     for (what, compression, theory) in [("P", true, 0.070), ("S", false, 0.171)] {
         let region = elastic(SHEAR_MODULUS, BULK_MODULUS);
@@ -93,7 +95,7 @@ fn sides_at_45_degrees() {
         let c = speed(&model, compression);
         let along = Vec2::new(1.0, 1.0).normalize();
         let across = Vec2::new(-along.y, along.x);
-        // The gradient of a potential for P, its curl for S: neither holds the other.
+        // The gradient of a potential for P, its curl for S: neither contains the other.
         let beam = |x: Vec2| {
             let from = x - Vec2::new(0.5 * WIDTH, 0.5 * HEIGHT);
             let place = Vec2::new(from.dot(&along) / (PULSE * SPACING), from.dot(&across) / BEAM);
@@ -105,7 +107,7 @@ fn sides_at_45_degrees() {
                 across * slope_along - along * slope_across
             }
         };
-        let mut simulation = under_way(&model, beam, Vec::new());
+        let mut simulation = with_initial_velocity(&model, beam, Vec::new());
         let energy = |simulation: &Simulation| -> f64 {
             simulation.velocity().iter().map(|v| v[0] * v[0] + v[1] * v[1]).sum()
         };
@@ -113,7 +115,7 @@ fn sides_at_45_degrees() {
         // The beams' centres meet the sides after `0.5 sqrt 2 WIDTH`, their far edges two half-widths later.
         let way = 0.5 * 2.0_f64.sqrt() * WIDTH + 2.0 * (BEAM + PULSE * SPACING);
         simulation.advance(u64::MAX, way / c).unwrap();
-        // Half of the energy is strain by now.
+        // Half of the energy is strain energy at this time.
         let amplitude = (2.0 * energy(&simulation) / before).sqrt();
         println!("{what} at 45 degrees: {:.1} % of the amplitude stays", 100.0 * amplitude);
         assert!((amplitude - theory).abs() < 0.05, "{amplitude}");
@@ -137,7 +139,7 @@ fn on_inclined_base(angle: f64, spacing: f64, width: f64) -> Model {
     let slope = angle.to_radians().tan();
     let columns = (width / spacing).round() as usize;
     let mut model = weightless(block(HEIGHT, spacing, columns, elastic(SHEAR_MODULUS, BULK_MODULUS), None));
-    // As in scenes, the lowest cell of a column reaches down to the base and its node stands in its middle.
+    // As in scenes, the lowest cell of a column reaches down to the base and its node is in its middle.
     model.position.retain(|x| x.y > slope * x.x);
     model.volume = vec![spacing * spacing; model.nodes()];
     for (x, volume) in model.position.iter_mut().zip(&mut model.volume) {
@@ -179,9 +181,10 @@ fn shaken(
     (times, (0..count).map(of).collect())
 }
 
-/// An upgoing shear wave passes an inclined base of its own impedance as if there were none: the surface moves by twice
-/// the wave, late by the height over the base's lowest point. What is left is the staircase of nodes above the base, and the
-/// wave on its way back, which meets the dashpots at the base's angle instead of squarely.
+/// An upgoing shear wave passes an inclined base of matching impedance without reflection: the surface moves
+/// by twice the wave, delayed by the height over the base's lowest point. The remaining error has two causes:
+/// the stepped nodes above the base, and the wave on its way down, which meets the dashpots at the angle of
+/// the base.
 #[test]
 fn an_inclined_matched_base_is_transparent() {
     const WIDTH: f64 = 16.0;
@@ -197,15 +200,16 @@ fn an_inclined_matched_base_is_transparent() {
                 apart.fold(0.0, f64::max) / (2.0 * AMPLITUDE)
             };
             let worst: Vec<f64> = found.iter().map(|probe| 100.0 * misfit(probe)).collect();
-            println!("{angle} degrees, {vertical:?}: off by {worst:.1?} % of the peak along the surface");
+            println!("{angle} degrees, {vertical:?}: error {worst:.1?} % of the peak along the surface");
             assert!(worst.iter().all(|off| *off < bound), "{worst:?}");
         }
     }
 }
 
-/// A vertical motion comes in through an absorbing base and leaves again: twice the wave at the surface, then silence.
+/// A vertical motion enters through an absorbing base and leaves again: twice the wave at the surface, then
+/// rest.
 #[test]
-fn a_compression_wave_comes_in_and_leaves() {
+fn a_compression_wave_enters_and_leaves() {
     for water in [None, Some(WATER)] {
         let model = weightless(block(HEIGHT, 0.25, 16, elastic(SHEAR_MODULUS, BULK_MODULUS), water));
         let c = speed(&model, true);
@@ -230,8 +234,9 @@ fn a_compression_wave_comes_in_and_leaves() {
     }
 }
 
-/// A wave that runs along the base runs along the surface at the same apparent velocity, as an inclined shear wave does.
-/// The columns beyond the sides take it for a wave that rises at their own time, which blurs it a little.
+/// A wave that travels along the base travels along the surface at the same apparent velocity, as an inclined
+/// shear wave does. The columns beyond the sides are shaken vertically at their own times, which causes a
+/// small error.
 #[test]
 fn a_travelling_wave_keeps_its_apparent_velocity() {
     const WIDTH: f64 = 40.0;

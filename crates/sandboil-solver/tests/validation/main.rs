@@ -1,4 +1,4 @@
-//! Closed forms that the solver as a whole has to meet, through its public interface.
+//! Comparison of the whole solver with closed forms, through its public interface.
 #![allow(clippy::unwrap_used)] // a failure is the test's own report
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // row counts of small columns
 

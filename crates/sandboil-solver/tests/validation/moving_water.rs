@@ -30,12 +30,12 @@ fn across(elevation: f64, condition: HydraulicCondition, at_rest: Option<f64>) -
     MovingBoundary { boundary: HydraulicBoundary { line, condition }, at_rest }
 }
 
-/// From one value to another between two moments, s.
+/// A linear change from one value to another between two times, s.
 fn ramp(from: (f64, f64), to: (f64, f64)) -> Series {
     Series { time: vec![from.0, to.0], value: vec![from.1, to.1] }
 }
 
-/// A stage without waves, damped enough to follow a slow change at rest.
+/// A stage without waves, with enough damping to stay near equilibrium in slow changes.
 fn standing(duration: f64, conditions: Vec<MovingBoundary>) -> Shaking {
     Shaking { conditions, local_damping: 0.3, ..shaking(None, duration, Vec::new()) }
 }
@@ -57,7 +57,8 @@ fn heave(simulation: &Simulation) -> Vec<f64> {
     simulation.displacement().iter().map(|u| u[1]).collect()
 }
 
-/// Water that falls on submerged ground takes its pressure everywhere and moves no grain once the pores have followed.
+/// A change of the water level above submerged ground changes the pressure everywhere, and moves no node
+/// after the pores have adapted.
 #[test]
 fn water_on_the_ground_weighs_through_its_pressure() {
     const FALL: f64 = 4.0;
@@ -70,7 +71,7 @@ fn water_on_the_ground_weighs_through_its_pressure() {
         let simulation = run(&model, standing(2.0, vec![across(HEIGHT, falling, None)]));
         let change = -WATER.unit_weight * FALL;
         let pressure = departure(&model, &simulation.excess_pore_pressure().unwrap(), |_| change) / -change;
-        // A load that the skeleton would bear alone would sink the surface by q H / M'.
+        // A load carried by the skeleton alone would move the surface by q H / M'.
         let moved = departure(&model, &heave(&simulation), |_| 0.0) / (-change * HEIGHT / CONFINED);
         println!(
             "{diffusion:?}: pressure off by {pressure:.1e}, displacement {moved:.1e} of that of the load alone"
@@ -79,8 +80,9 @@ fn water_on_the_ground_weighs_through_its_pressure() {
     }
 }
 
-/// Before the pores can follow, skeleton and water share the load as their stiffnesses: `dp = B dq`. The row below the
-/// surface has the water's own pressure, and rows beneath it alternate about what they share.
+/// Before the pores can drain, skeleton and water share the load by their stiffnesses: `dp = B dq`. The row
+/// below the surface has the pressure of the water above, and the rows under it alternate about the shared
+/// value.
 #[test]
 fn sudden_water_is_shared_by_skeleton_and_pores() {
     const RISE: f64 = 1.0;
@@ -99,13 +101,14 @@ fn sudden_water_is_shared_by_skeleton_and_pores() {
         let pairs = excess.windows(2).zip(&model.position).filter(|(_, at)| at.y < 0.5 * HEIGHT);
         pairs.map(|(pair, _)| (0.5 * (pair[0] + pair[1]) / expected - 1.0).abs()).fold(0.0, f64::max)
     });
-    println!("excess of pairs of rows in the lower half off by {errors:.4?}");
+    println!("error of the excess of pairs of rows in the lower half: {errors:.4?}");
     assert!(errors[0] < 0.01 && errors[1] < 0.6 * errors[0]);
 }
 
-/// Water pressed up from below: heads fall along the column by Darcy's law, effective stress gives way by as much.
+/// Upward flow from a head at the base: heads fall along the column by Darcy's law, and effective stress
+/// decreases by the same amount.
 #[test]
-fn a_head_below_lifts_the_ground() {
+fn a_head_at_the_base_lifts_the_ground() {
     const HEAD: f64 = 0.4;
     for diffusion in [Diffusion::Implicit, Diffusion::Explicit] {
         let model = ground(1e-3, diffusion);
@@ -116,14 +119,14 @@ fn a_head_below_lifts_the_ground() {
             departure(&model, &simulation.excess_pore_pressure().unwrap(), |y| load * (1.0 - y / HEIGHT));
         let lift = |y: f64| load / CONFINED * (y - y * y / (2.0 * HEIGHT));
         let lifted = departure(&model, &heave(&simulation), lift) / lift(HEIGHT);
-        println!("{diffusion:?}: excess off by {:.1e}, heave by {lifted:.1e}", excess / load);
+        println!("{diffusion:?}: error of excess {:.1e}, of heave {lifted:.1e}", excess / load);
         assert!(excess / load < 1e-3 && lifted < 5e-3);
     }
 }
 
 /// The same by an inflow: `q = gamma_f v / k` per depth.
 #[test]
-fn an_inflow_below_raises_the_head() {
+fn an_inflow_at_the_base_raises_the_head() {
     const CONDUCTIVITY: f64 = 1e-3;
     const INFLOW: f64 = 2e-4;
     for diffusion in [Diffusion::Implicit, Diffusion::Explicit] {
@@ -133,17 +136,17 @@ fn an_inflow_below_raises_the_head() {
         let load = WATER.unit_weight * INFLOW / CONDUCTIVITY * HEIGHT;
         let excess =
             departure(&model, &simulation.excess_pore_pressure().unwrap(), |y| load * (1.0 - y / HEIGHT));
-        println!("{diffusion:?}: excess off by {:.1e}", excess / load);
-        // A tenth of what a row takes: the half cell below the surface.
+        println!("{diffusion:?}: error of excess {:.1e}", excess / load);
+        // A tenth of the pressure difference over a row: the half cell below the surface.
         assert!(excess / load < 0.1 * SPACING / HEIGHT);
     }
 }
 
-/// A drain across the middle takes the pressure that would have to go to the surface.
+/// A drain across the middle shortens the drainage path.
 #[test]
-fn a_drain_shortens_the_way() {
+fn a_drain_shortens_the_drainage_path() {
     let diffusivity = 1e-3 / (WATER.unit_weight * (1.0 / CONFINED + 0.4 / WATER.bulk_modulus));
-    // Both halves drain at the end of a way of H/2, the upper one at both.
+    // Both halves have a drainage path of H/2 to the drain; the upper half also drains at its other end.
     let time = 0.3 * HEIGHT * HEIGHT / 4.0 / diffusivity;
     for diffusion in [Diffusion::Implicit, Diffusion::Explicit] {
         let model = ground(1e-3, diffusion);
@@ -154,7 +157,7 @@ fn a_drain_shortens_the_way() {
             simulation.advance(u64::MAX, f64::INFINITY).unwrap();
             simulation.excess_pore_pressure().unwrap()[..COLUMNS].iter().sum::<f64>() / COLUMNS as f64
         };
-        // At rest the drain let through what it found there.
+        // The drain is at the pressure that was there at rest.
         let drained = left(vec![across(0.5 * HEIGHT, HydraulicCondition::Drain, Some(0.0))]);
         let alone = left(Vec::new());
         let series = |time_factor: f64| {
@@ -174,7 +177,7 @@ fn a_drain_shortens_the_way() {
     }
 }
 
-/// In the plane, a head raised on one side spreads as it would through ground at rest.
+/// In two dimensions, a head that is raised on one side spreads as through ground at rest.
 #[test]
 fn a_head_on_a_side_spreads_as_through_ground_at_rest() {
     let (width, rise) = (2.0, 0.5);
@@ -212,13 +215,13 @@ fn a_head_on_a_side_spreads_as_through_ground_at_rest() {
     let expected = at_rest.head().into_iter().map(|head| WATER.unit_weight * (head - HEIGHT));
     let squares: f64 = excess.iter().zip(expected).map(|(q, e)| (q - e).powi(2)).sum();
     let error = (squares / nodes as f64).sqrt() / (WATER.unit_weight * rise);
-    println!("heads off by {error:.1e} rms of the rise");
+    println!("rms error of heads {error:.1e} of the rise");
     assert!(error < 5e-3);
 }
 
-/// A condition that goes on as it was at rest moves nothing, whatever flows there.
+/// A condition that stays as it was at rest moves nothing, also where water flows through it.
 #[test]
-fn conditions_that_go_on_move_nothing() {
+fn unchanged_conditions_move_nothing() {
     let mut model = ground(1e-4, Diffusion::Auto);
     // Water that flows upwards at rest.
     for (pressure, at) in model.pore_pressure.iter_mut().zip(&model.position) {
@@ -231,9 +234,9 @@ fn conditions_that_go_on_move_nothing() {
     assert!(simulation.excess_pore_pressure().unwrap().iter().all(|q| q.abs() < 1e-12));
 }
 
-/// Stiff ground that drains while it may move does as ground at rest does.
+/// Stiff ground that can move drains as ground at rest.
 #[test]
-fn ground_that_may_move_drains_like_ground_at_rest() {
+fn ground_that_can_move_drains_as_ground_at_rest() {
     const DURATION: f64 = 8.0;
     let soft_water = Water { bulk_modulus: 2e4, ..WATER };
     let curve = VanGenuchten::new(3.0, 2.5, 0.1, 1.0).unwrap();
@@ -253,7 +256,7 @@ fn ground_that_may_move_drains_like_ground_at_rest() {
         condition: falling.clone(),
     };
     let mut at_rest = Seepage::new(&model, &model.pore_pressure, vec![below]).unwrap();
-    // Steps far shorter than it would take by itself: its own error of time is then small.
+    // Steps far shorter than the automatic ones: the time error of seepage is then small.
     for k in 1..=1000 {
         at_rest.advance(Until::Time(DURATION * f64::from(k) / 1000.0), |_| true).unwrap();
     }
@@ -274,8 +277,8 @@ fn ground_that_may_move_drains_like_ground_at_rest() {
             "{diffusion:?}: heads off by {miss:.1e} m of 0.4, water drained {here:.5e} and {there:.5e} m2"
         );
         assert!(miss < 0.01 * 0.4 && (here / there - 1.0).abs() < 0.01);
-        // The lowest rows, full still, bear no more what has drained above: total stress by Bishop, tension positive. Single
-        // rows alternate about it by some per cent.
+        // The lowest rows, still saturated, no longer carry the weight of the water that has drained above:
+        // total stress by Bishop, tension positive. Single rows alternate about it by some per cent.
         let relief = |i: usize| {
             let stress = simulation.stress()[i];
             let at_rest = &model.vertical_effective_stress[2 * i..2 * i + 2];
@@ -285,7 +288,7 @@ fn ground_that_may_move_drains_like_ground_at_rest() {
         };
         let relieved = 0.5 * (relief(0) + relief(COLUMNS));
         let weight = here * soft_water.unit_weight / WIDTH;
-        println!("relieved of {relieved:.4} kPa, weight drained {weight:.4} kPa");
+        println!("decrease of stress {relieved:.4} kPa, weight of drained water {weight:.4} kPa");
         assert!((relieved / weight - 1.0).abs() < 0.02);
     }
 }

@@ -1,5 +1,5 @@
-//! Base and sides measured by what they return, pass and bear: spectra of reflections, layers on other half-spaces,
-//! obstacles in wider domains, segments, and the least and the strongest that they can be asked for.
+//! Reflection, transmission and stability at base and sides: spectra of reflections, layers on other
+//! half-spaces, obstacles in wider domains, segments, and extreme input.
 
 use crate::{
     common::{column, elastic, shaking},
@@ -43,7 +43,7 @@ fn largest_speeds(model: &Model, base: Base, duration: f64) -> [f64; 2] {
         simulation.advance(1, f64::INFINITY).unwrap();
         let half = usize::from(simulation.time() > 0.5 * duration);
         for [x, y] in simulation.velocity() {
-            // A maximum would overlook what is not a number.
+            // A maximum would ignore NaN.
             assert!(x.is_finite() && y.is_finite());
             largest[half] = largest[half].max(x.hypot(y));
         }
@@ -51,9 +51,10 @@ fn largest_speeds(model: &Model, base: Base, duration: f64) -> [f64; 2] {
     largest
 }
 
-/// The part of a wave that a base returns, over the wavelength. A pulse in mid-height parts in two: one half meets the
-/// surface at a quarter of the run, the other the base first, and what the base returns of it meets the surface at three
-/// quarters. The ratio of their spectra there is the reflection, free of dispersion on the way up.
+/// The part of a wave that a base reflects, by wavelength. A pulse at mid-height splits in two: one half
+/// reaches the surface at a quarter of the run; the other meets the base first, and its reflection reaches
+/// the surface at three quarters. The ratio of their spectra at the surface is the reflection coefficient,
+/// without dispersion on the way up.
 fn reflection(water: Option<Water>, compression: bool, vertical: Vertical) -> [f64; 2] {
     const SPACING: f64 = 0.2;
     const HEIGHT: f64 = 20.0;
@@ -100,7 +101,7 @@ fn reflection(water: Option<Water>, compression: bool, vertical: Vertical) -> [f
 }
 
 #[test]
-fn the_base_returns_little_of_any_wavelength() {
+fn the_base_reflects_little_of_any_wavelength() {
     for (what, water, compression, vertical) in [
         ("S", None, false, Vertical::Roller),
         ("S, absorbing", None, false, Vertical::Absorbing),
@@ -120,7 +121,8 @@ fn the_base_returns_little_of_any_wavelength() {
     assert!((long - 1.0).abs() < 0.05, "{long}");
 }
 
-/// Ground at rest stays at rest when base and sides are let go: they carry the reactions that they had.
+/// Ground at rest stays at rest when base and sides are released: they keep the reactions of the static
+/// stage.
 #[test]
 fn nothing_moves_without_a_wave() {
     for water in [None, Some(WATER)] {
@@ -141,9 +143,9 @@ fn nothing_moves_without_a_wave() {
     }
 }
 
-/// One layer on a half-space, impedance ratio `q` of layer to half-space: surface over outcrop is
-/// `1 / (cos kH + i q sin kH)`. Taken at complex frequencies `omega - i s`, so that what still rings at the end of the
-/// record does not count.
+/// One layer on a half-space, impedance ratio `q` of layer to half-space: surface over outcrop is `1 / (cos
+/// kH + i q sin kH)`. Taken at complex frequencies `omega - i s`, so that the vibration left at the end of
+/// the record does not count.
 #[test]
 fn a_layer_on_any_half_space_has_its_transfer_function() {
     const HEIGHT: f64 = 10.0;
@@ -170,15 +172,15 @@ fn a_layer_on_any_half_space_has_its_transfer_function() {
             let exact = 1.0 / (cos[0] - ratio * sin[1]).hypot(cos[1] + ratio * sin[0]);
             amplitude(&times, &surface, frequency) / amplitude(&times, &outcrop, frequency) / exact - 1.0
         });
-        println!("impedance ratio {ratio}: off by {:.2?} %", off.map(|off| 100.0 * off));
+        println!("impedance ratio {ratio}: error {:.2?} %", off.map(|off| 100.0 * off));
         assert!(off.iter().all(|off| off.abs() < 0.02), "{ratio}: {off:?}");
     }
 }
 
-/// Soft ground in the middle scatters waves to the sides. What the sides send back shows against a domain three times as
-/// wide, whose sides are too far away to be heard for most of the run.
+/// Soft ground in the middle scatters waves to the sides. The reflection of the sides is the difference from
+/// a domain three times as wide, whose sides are so far away that they have no effect for most of the run.
 #[test]
-fn an_obstacle_does_not_feel_how_wide_its_domain_is() {
+fn the_width_of_the_domain_does_not_affect_an_obstacle() {
     const HEIGHT: f64 = 10.0;
     const SPACING: f64 = 0.5;
     const WIDTH: f64 = 40.0;
@@ -209,7 +211,7 @@ fn an_obstacle_does_not_feel_how_wide_its_domain_is() {
     assert!(apart < 0.03, "{apart}");
 }
 
-/// Segments move with their own records at their own times, and so do the columns at the sides above them.
+/// Segments move with their own records at their own times, and so do the columns above them at the sides.
 #[test]
 fn segments_move_the_ground_above_them() {
     const HEIGHT: f64 = 10.0;
@@ -249,11 +251,12 @@ fn segments_move_the_ground_above_them() {
         "left and right of the joint: off by {:.1?} %",
         off.iter().map(|o| 100.0 * o).collect::<Vec<_>>()
     );
-    // Waves scattered at the joint, three depths away, come by within the run.
+    // Waves scattered at the joint, three depths away, arrive within the run.
     assert!(off.iter().all(|off| *off < 0.1), "{off:?}");
 }
 
-/// A record that begins with its full velocity: the front overshoots by the lattice's own waves and settles.
+/// A record that begins with its full velocity: the front overshoots by the shortest waves of the lattice,
+/// and settles.
 #[test]
 fn a_step_in_the_record_settles() {
     let model = weightless(column(10.0, 0.25, 1, elastic(SHEAR_MODULUS, BULK_MODULUS), None));
@@ -290,7 +293,7 @@ fn shallow_and_narrow_ground_is_stable() {
     }
 }
 
-/// Dashpots ten thousand times as strong as the soil's neither limit the step nor drive anything.
+/// Dashpots ten thousand times as strong as those of the soil neither limit the time step nor add energy.
 #[test]
 fn strong_dashpots_are_stable() {
     let model = dry_block(4.0, 0.2, 10);
@@ -304,12 +307,14 @@ fn strong_dashpots_are_stable() {
         };
         let [first, second] = largest_speeds(&model, base, 4.0).map(|v| v / (2.0 * AMPLITUDE));
         println!("{vertical:?}: {first:.3} of twice the wave, later {second:.3}");
-        // On a rigid base the columns ring near their first mode, hardly damped, and the section with them.
+        // On a rigid base the columns vibrate near their first mode with little damping, and the section with
+        // them.
         assert!(first < 10.0 && second < first, "{first} {second}");
     }
 }
 
-/// Free-field sides gather per node: threads change no bit. Without them there is nothing of theirs.
+/// Free-field sides gather at each node: results have the same bits with any number of threads. Without
+/// free-field sides their arrays do not exist.
 #[test]
 fn threads_change_no_bit_between_free_field_sides() {
     let model = block(10.0, 0.5, 20, elastic(SHEAR_MODULUS, BULK_MODULUS), Some(WATER));

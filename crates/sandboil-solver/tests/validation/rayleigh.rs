@@ -57,7 +57,7 @@ fn layered(layers: &[Layer]) -> Model {
 fn transfer_function(layers: &[Layer], damping: Option<Rayleigh>, frequency: f64) -> f64 {
     let w = 2.0 * PI * frequency;
     let (a, b) = damping.map_or((0.0, 0.0), |d| (d.mass_coefficient(), d.stiffness_coefficient()));
-    // Velocity and shear stress at the surface, carried down through the layers.
+    // Velocity and shear stress, from the surface down through the layers.
     let (mut velocity, mut stress) = (Complex::new(1.0, 0.0), Complex::new(0.0, 0.0));
     for Layer { thickness, speed, density } in layers {
         let modulus = density * speed * speed * Complex::new(1.0, b * w);
@@ -70,7 +70,7 @@ fn transfer_function(layers: &[Layer], damping: Option<Rayleigh>, frequency: f64
     (velocity - stress / (HALF_SPACE.shear_speed * HALF_SPACE.density)).norm().recip()
 }
 
-/// Spacings in the shortest wave of the soft layer that is compared, in turn.
+/// Spacings per shortest wavelength in the soft layer for which the comparison is made.
 const REACH: [f64; 4] = [50.0, 40.0, 30.0, 20.0];
 
 /// Largest relative difference of a column's transfer function from the closed form of `exact` layers, down to each of
@@ -79,7 +79,7 @@ fn misfits(model: &Model, exact: &[Layer], damping: Option<Rayleigh>) -> [f64; 4
     const CENTRE: f64 = 0.5;
     const PULSE: f64 = 10.0;
     const DURATION: f64 = 6.0;
-    // Lowest frequency compared, and from one to the next, Hz.
+    // Lowest frequency of the comparison, and its increment, Hz.
     const LOWEST: f64 = 0.5;
     const STEP: f64 = 0.1;
     let upgoing = |time: f64| ricker(PULSE, time - CENTRE);
@@ -101,7 +101,7 @@ fn misfits(model: &Model, exact: &[Layer], damping: Option<Rayleigh>) -> [f64; 4
     })
 }
 
-fn told(name: &str, damping: Option<Rayleigh>, misfits: [f64; 4]) -> String {
+fn report(name: &str, damping: Option<Rayleigh>, misfits: [f64; 4]) -> String {
     let damped = if damping.is_some() { "damped" } else { "undamped" };
     let [a, b, c, d] = misfits.map(|misfit| 100.0 * misfit);
     format!(
@@ -116,15 +116,15 @@ fn transfer_functions_of_layers() {
     for (name, layers) in [("one layer", &[SOFT][..]), ("two layers", &[SOFT, STIFF][..])] {
         for damping in [None, Some(DAMPING)] {
             let found = misfits(&layered(layers), layers, damping);
-            println!("{}", told(name, damping, found));
+            println!("{}", report(name, damping, found));
             assert!(found[0] < 0.02, "{found:?}");
         }
     }
 }
 
-/// With corrected inertia two layers are within 2 % of the closed form for waves of 20 spacings and more, at h/dx 1.0 and
-/// 1.2. A greater contrast, and one layer, whose resonances are the sharpest, take more from the time step: 1.9 % is left of
-/// one layer's 2.8 % at a sixth of the step.
+/// With corrected inertia two layers are within 2 % of the closed form for waves of 20 spacings and more, at
+/// h/dx 1.0 and 1.2. For a greater contrast, and for one layer, whose resonances are the sharpest, the error
+/// of the time step is larger: the 2.8 % of one layer become 1.9 % with a sixth of the step.
 #[test]
 fn corrected_transfer_functions_of_layers() {
     let stiffer = Layer { speed: 400.0, ..STIFF };
@@ -140,16 +140,16 @@ fn corrected_transfer_functions_of_layers() {
             model.numerics.smoothing_ratio = ratio;
             model.numerics.dispersion_correction = true;
             let found = misfits(&model, layers, damping);
-            println!("h/dx {ratio}, {}", told(name, damping, found));
+            println!("h/dx {ratio}, {}", report(name, damping, found));
             assert!(found.iter().zip(bounds).all(|(found, bound)| *found < bound), "{found:?}");
         }
     }
 }
 
-/// Corrected inertia next to the limit of the time step, where a soil meets another of a hundredth or a hundred times
-/// its stiffness: what the base lets in leaves again.
+/// Corrected inertia close to the limit of the time step, at a contact of soils whose stiffness differs by a
+/// factor of a hundred: waves that enter through the base leave again.
 #[test]
-fn corrected_inertia_bears_any_contrast() {
+fn corrected_inertia_is_stable_at_any_contrast() {
     for speed in [10.0, 1000.0] {
         let mut model = layered(&[Layer { speed, ..SOFT }, SOFT]);
         model.numerics.dispersion_correction = true;
@@ -168,7 +168,7 @@ fn corrected_inertia_bears_any_contrast() {
     }
 }
 
-/// The ratio of a standing wave at both frequencies, and less between.
+/// The damping ratio of a standing wave has the given value at both frequencies, and is less between them.
 #[test]
 fn damping_ratio_of_a_standing_wave() {
     for frequency in [1.0, 10.0_f64.sqrt(), 10.0, 20.0] {

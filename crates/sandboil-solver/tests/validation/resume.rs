@@ -1,4 +1,4 @@
-//! A stored simulation goes on as if it had never stopped, and bytes that are not as they were written are refused.
+//! A stored simulation continues with the same bits, and changed bytes are refused.
 
 use crate::{
     common::{column, elastic, shaking},
@@ -25,13 +25,13 @@ const WATER: Water = Water { unit_weight: 10.0, bulk_modulus: 1e5 };
 const GRAVITY: Gravity = Gravity { tolerance: 1e-3, max_steps: 20_000 };
 const SPACING: f64 = 0.4;
 const HEIGHT: f64 = 8.0;
-/// So many nodes in a row give the threads something to share.
+/// Nodes in a row: enough for several threads.
 const COLUMNS: usize = 13;
 const DURATION: f64 = 0.05;
-/// Steps between the places where a run is stopped.
+/// Steps between the stops of a run.
 const STEPS_BETWEEN: u64 = 37;
 
-/// A soil of every kind, from below.
+/// Soils of every kind, from the base upwards.
 fn soils() -> Vec<Region> {
     let skeleton = Elastic::new(2e4, 4e4).unwrap();
     let strength = Strength { c: 2.0, phi: 30.0, psi: 5.0 };
@@ -55,7 +55,7 @@ fn soils() -> Vec<Region> {
     .collect()
 }
 
-/// The model with its soils in layers from below.
+/// The model with its soils in layers, from the base upwards.
 fn layered(mut model: Model) -> Model {
     let regions = soils();
     let layer = HEIGHT / regions.len() as f64;
@@ -81,7 +81,7 @@ struct Case {
     stage: Shaking,
 }
 
-/// Every part that a simulation may have is in one of them.
+/// Cases that together include every part that a simulation may have.
 fn cases() -> Vec<Case> {
     let case = |name, change: &dyn Fn(&mut Model, &mut Shaking)| {
         let mut model = layered(column(HEIGHT, SPACING, COLUMNS, elastic(1.0, 1.0), Some(WATER)));
@@ -116,7 +116,7 @@ fn cases() -> Vec<Case> {
 /// The stages of a run after the static one.
 const SHAKING_STAGES: usize = 2;
 
-/// Where a run stands: its shaking stages begun, and the simulation as bytes.
+/// A stop in a run: the number of shaking stages begun, and the simulation as bytes.
 type Stop = (usize, Vec<u8>);
 
 fn stored(simulation: &Simulation) -> Vec<u8> {
@@ -125,7 +125,7 @@ fn stored(simulation: &Simulation) -> Vec<u8> {
     bytes
 }
 
-/// Runs from `begun` shaking stages to the end of the last one, and tells of every stop.
+/// Runs a simulation with `begun` shaking stages to the end of the last one, and calls `stop` at every stop.
 fn run(case: &Case, mut simulation: Simulation, begun: usize, mut stop: impl FnMut(Stop)) -> Simulation {
     for stage in begun..=SHAKING_STAGES {
         if stage > begun {
@@ -147,10 +147,10 @@ fn a_stored_run_ends_with_the_same_bits() {
         simulation.begin(GRAVITY).unwrap();
         let whole = run(&case, simulation, 0, |stop| stops.push(stop));
         let (counters, expected) = (whole.counters(), stored(&whole));
-        // The last stage begins with one, and renews it under way.
+        // The last stage begins with a geometry, and renews it during the run.
         assert!(counters.geometry_builds > 1, "{}: {counters:?}", case.name);
         assert!(counters.soil.substeps > 0, "{}: {counters:?}", case.name);
-        // Some of the stops, spread over all stages, in turn with these threads.
+        // Some of the stops, spread over all stages, with these numbers of threads in turn.
         let chosen = stops.iter().step_by(stops.len().div_ceil(6)).zip([2, 1, 3, 8].into_iter().cycle());
         for ((begun, bytes), threads) in chosen {
             let simulation = Simulation::restore(&case.model, threads, bytes).unwrap();
@@ -165,7 +165,7 @@ fn a_stored_run_ends_with_the_same_bits() {
     }
 }
 
-/// A small state under way.
+/// A small running state.
 static SMALL: LazyLock<(Model, Vec<u8>)> = LazyLock::new(|| {
     let mut model = column(2.0, SPACING, 1, soils().pop().unwrap(), Some(WATER));
     model.numerics.diffusion = Diffusion::Implicit;
@@ -198,11 +198,11 @@ fn a_state_of_something_else_is_refused() {
     assert_eq!(refusal(&of_version_nine), StateError::Version { found: 9, needed: 1 });
     let mut of_other_build = bytes.clone();
     of_other_build[12] ^= 1;
-    assert_eq!(refusal(&summed_anew(of_other_build)), StateError::Build);
+    assert_eq!(refusal(&with_correct_checksum(of_other_build)), StateError::Build);
 }
 
-/// The bytes with a checksum that is right.
-fn summed_anew(mut bytes: Vec<u8>) -> Vec<u8> {
+/// The bytes with a correct checksum.
+fn with_correct_checksum(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes.truncate(bytes.len() - 4);
     let sum = crc32fast::hash(&bytes);
     bytes.extend(sum.to_le_bytes());
@@ -214,12 +214,12 @@ const STATE_AT: usize = 8 + 4 + 4 + 8 + 4;
 
 proptest! {
     #[test]
-    fn flipped_bits_are_seen(flips in prop::collection::vec((any::<prop::sample::Index>(), 1_u8..), 1..4)) {
+    fn flipped_bits_are_detected(flips in prop::collection::vec((any::<prop::sample::Index>(), 1_u8..), 1..4)) {
         let mut bytes = SMALL.1.clone();
         let mut places = Vec::new();
         for (index, mask) in flips {
             let place = index.index(bytes.len());
-            // Flipping a place twice may undo it.
+            // Two changes at the same byte may cancel.
             if !places.contains(&place) {
                 bytes[place] ^= mask;
                 places.push(place);
@@ -232,7 +232,7 @@ proptest! {
     }
 
     #[test]
-    fn missing_and_added_bytes_are_seen(index in any::<prop::sample::Index>(), added in prop::collection::vec(any::<u8>(), 1..9)) {
+    fn missing_and_added_bytes_are_detected(index in any::<prop::sample::Index>(), added in prop::collection::vec(any::<u8>(), 1..9)) {
         let bytes = &SMALL.1;
         let length = index.index(bytes.len());
         let error = refusal(&bytes[..length]);
@@ -241,7 +241,8 @@ proptest! {
         prop_assert!(matches!(error, StateError::Damaged(_)), "{error}");
     }
 
-    /// Whoever forges the checksum too gets a refusal or a simulation, and neither a panic nor a flood of memory.
+    /// Changed bytes with a correct checksum give an error or a simulation, but no panic and no excessive
+    /// memory.
     #[test]
     fn forged_states_are_read_without_panic(flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8), cut in 0_usize..64) {
         let mut bytes = SMALL.1.clone();
@@ -250,7 +251,7 @@ proptest! {
             bytes[place] = value;
         }
         bytes.truncate(bytes.len() - cut);
-        let _ = Simulation::restore(&SMALL.0, 1, &summed_anew(bytes));
+        let _ = Simulation::restore(&SMALL.0, 1, &with_correct_checksum(bytes));
     }
 
     #[test]

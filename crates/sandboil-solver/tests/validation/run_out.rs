@@ -1,4 +1,4 @@
-//! Ground that flows: a heap let go, dry, wet and below water, to where it comes to rest.
+//! Run-out: a heap is released, dry, wet and under water, until it comes to rest.
 //!
 //! The heap is that of Bui et al. (2008, Int. J. Numer. Anal. Meth. Geomech. 32, 1537-1570), 0.2 m wide and 0.1 m high:
 //! phi 19.8 degrees, no cohesion, a Young's modulus of 840 kPa and Poisson's ratio 0.3.
@@ -50,7 +50,7 @@ fn run_out(duration: f64, still_water: Option<Vec<Vec2>>) -> RunOut {
     }
 }
 
-/// Largest x of the nodes that hang together with the heap, none further from the next than two spacings, m.
+/// Largest x of the nodes that are connected with the heap by distances of at most two spacings, m.
 fn front(simulation: &Simulation, spacing: f64) -> f64 {
     let places = simulation.position();
     let mut reached = vec![false; places.len()];
@@ -73,8 +73,9 @@ fn history(rows: &[f64], name: &str) -> Vec<f64> {
     rows.chunks(ENERGY_NAMES.len()).map(|row| row[k]).collect()
 }
 
-/// Runs a heap until at most a share `rest` of the peak of its kinetic energy is left. What the forces of the skeleton take never falls: the energy of motion, weight, stress and water
-/// together never grows. No grain is lost.
+/// Runs a heap until at most a share `rest` of the peak of its kinetic energy is left. The energy taken by
+/// the skeleton's forces never decreases: the sum of kinetic energy and energy of weight, stress and water
+/// never increases. No node is lost.
 fn comes_to_rest(
     name: &str,
     model: &Model,
@@ -93,7 +94,7 @@ fn comes_to_rest(
     let grown: Vec<f64> = renewal.iter().map(|gain| -gain).collect();
     let given = falls(&taken).max(falls(&grown));
     let left = kinetic.last().unwrap() / peak;
-    let told = format!(
+    let report = format!(
         "{name}: front {:.3} m, kinetic energy left {left:.1e} of its peak, energy given {given:.1e} kJ/m, {} geometries",
         front(&simulation, model.spacing.x),
         simulation.counters().geometry_builds
@@ -101,20 +102,20 @@ fn comes_to_rest(
     assert!(solid.iter().all(|mass| mass == &solid[0]), "{name}");
     assert!(left < rest, "{name}: {left}");
     assert!(given < 1e-9 * peak, "{name}: {given}");
-    (simulation, told)
+    (simulation, report)
 }
 
 #[test]
 fn dry_heap_comes_to_rest() {
     let spacing = 0.005;
-    let (simulation, told) = comes_to_rest("dry", &heap(spacing, None, 0.0), None, 0.9, 1e-5);
+    let (simulation, report) = comes_to_rest("dry", &heap(spacing, None, 0.0), None, 0.9, 1e-5);
     let front = front(&simulation, spacing);
     let top = simulation.position().iter().map(|at| at[1]).fold(0.0, f64::max);
-    println!("{told}, top {top:.4} m");
+    println!("{report}, top {top:.4} m");
     assert!((0.36..0.41).contains(&front) && (top - 0.0975).abs() < 1e-3, "{front} {top}");
 }
 
-/// Wet and submerged heaps, where water cannot leave, hardly can, and is gone in a moment: they run further where it can.
+/// Wet and submerged heaps, undrained, poorly drained and quickly drained: drained heaps run further.
 #[test]
 fn saturated_heaps_come_to_rest() {
     let spacing = 0.01;
@@ -125,18 +126,18 @@ fn saturated_heaps_come_to_rest() {
             let pressure = |at: &Vec2| WATER.unit_weight * (level - at.y);
             model.pore_pressure =
                 model.position.iter().map(|at| if depth > 0.0 { pressure(at) } else { 0.0 }).collect();
-            let told = format!("{name}, k {conductivity} m/s");
-            let (simulation, told) = comes_to_rest(&told, &model, None, 3.0, 1e-4);
-            println!("{told}");
+            let report = format!("{name}, k {conductivity} m/s");
+            let (simulation, report) = comes_to_rest(&report, &model, None, 3.0, 1e-4);
+            println!("{report}");
             front(&simulation, spacing)
         });
         assert!(fronts[1..].iter().all(|drained| *drained > fronts[0] + 2.0 * spacing), "{fronts:?}");
     }
 }
 
-/// How deep the water is that covers a heap changes nothing.
+/// The depth of the water above a heap has no effect.
 #[test]
-fn depth_of_still_water_moves_nothing() {
+fn depth_of_still_water_has_no_effect() {
     let place = |level: f64| {
         let mut model = heap(0.01, Some(WATER), 1e-3);
         model.pore_pressure = model.position.iter().map(|at| WATER.unit_weight * (level - at.y)).collect();
@@ -153,8 +154,8 @@ fn depth_of_still_water_moves_nothing() {
     assert!(moved > 0.005 && apart < 1e-9, "{apart} {moved}");
 }
 
-/// Excess pressure in a column drains through the free surface as Terzaghi's series says, to the first order: what crosses
-/// the surface leaves from the centre of the node below it.
+/// Excess pressure in a column drains through the free surface by Terzaghi's series, to first order: water
+/// leaves from the centre of the node below the surface.
 #[test]
 fn excess_pressure_drains_through_the_free_surface() {
     const DEPTH: f64 = 10.0;
@@ -166,7 +167,7 @@ fn excess_pressure_drains_through_the_free_surface() {
         region.hydraulic_conductivity = Conductivity::isotropic(1e-3);
         let water = Water { unit_weight: 10.0, bulk_modulus: 1e6 };
         let mut model = column(DEPTH, spacing, 5, region, Some(water));
-        // At rest the excess carries a part of what the grains else would, as after an earthquake.
+        // At rest the excess carries a part of the effective stress, as after an earthquake.
         model.pore_pressure.iter_mut().for_each(|pressure| *pressure += EXCESS);
         model.vertical_effective_stress.iter_mut().for_each(|stress| *stress -= EXCESS);
         model.regions[0].earth_pressure_coefficient = 0.5;
@@ -191,7 +192,7 @@ fn excess_pressure_drains_through_the_free_surface() {
             };
             let found = simulation.excess_pore_pressure().unwrap();
             let places = simulation.position();
-            // Excess counts from rest, where it was there already.
+            // Excess counts from the state at rest, which includes the initial excess.
             let error: Vec<f64> = found
                 .iter()
                 .zip(&places)
@@ -204,8 +205,8 @@ fn excess_pressure_drains_through_the_free_surface() {
     }
 }
 
-/// Ground that stands goes on standing when it is let go: after statics, and after shaking. The new geometry of its settled
-/// nodes is out of balance by their strain, 3e-4 of gravity in a row.
+/// Stable ground does not move when it is released, after statics and after shaking. The new geometry of its
+/// settled nodes causes an imbalance by their strain, 3e-4 of gravity in a row.
 #[test]
 fn stable_ground_stays() {
     let mut region = elastic(2e4, 4e4);
@@ -234,7 +235,7 @@ fn stable_ground_stays() {
     }
 }
 
-/// The same bits with any number of threads, and from a state stored under way.
+/// The same bits with any number of threads, and from a state stored during the run.
 #[test]
 fn run_outs_have_the_same_bits() {
     let model = heap(0.005, Some(WATER), 1e-3);
@@ -257,7 +258,8 @@ fn run_outs_have_the_same_bits() {
     assert_eq!(whole.counters(), second.counters());
 }
 
-/// Choices that exclude large displacements are refused, and so is any stage after one of these.
+/// Choices that exclude large displacements are refused, and so is any stage after one of large
+/// displacements.
 #[test]
 fn exclusive_choices_are_refused() {
     let model = heap(0.01, None, 0.0);

@@ -10,7 +10,8 @@ use sandboil_sph::Vec2;
 
 const WATER: Water = Water { unit_weight: 10.0, bulk_modulus: 1e6 };
 
-/// A rectangle between sides, its lower left corner at the origin; `region_of` tells the region at a place.
+/// A rectangle between sides, its lower left corner at the origin; `region_of` gives the region at a
+/// position.
 fn rectangle(
     [width, height]: [f64; 2],
     spacing: f64,
@@ -62,7 +63,7 @@ fn steady(model: &Model, boundaries: Vec<HydraulicBoundary>) -> Seepage {
     seepage
 }
 
-/// Two layers across the flow: the flux of the resistances in series.
+/// Two layers across the flow: the flux through both resistances in series.
 #[test]
 fn layers_in_series() {
     for contrast in [1.0, 1e3, 1e6] {
@@ -79,9 +80,9 @@ fn layers_in_series() {
     }
 }
 
-/// A dam with vertical faces, 16 m thick between 24 and 4 m of water: its discharge is exact whatever its phreatic surface
-/// (Charny), which leaves it at 12.79 m (Hornung and Krueger 1985). Capillary flow above it adds what falls with the
-/// capillary rise.
+/// A dam with vertical faces, 16 m thick between 24 and 4 m of water: its discharge is exact for any phreatic
+/// surface (Charny); the surface ends at 12.79 m (Hornung and Krueger 1985). Capillary flow above it adds an
+/// error that decreases with the capillary rise.
 #[test]
 fn dam_with_vertical_faces() {
     for (spacing, alpha) in [(1.0, 4.0), (0.5, 8.0), (0.25, 16.0)] {
@@ -109,12 +110,12 @@ fn elliptic(modulus: f64) -> f64 {
     std::f64::consts::FRAC_PI_2 / a
 }
 
-/// A sheet pile in a layer: discharge by conformal mapping (Harr 1962), with depths stretched in anisotropic soil. Half of
-/// the section: the head in the middle is the mean below the pile.
+/// A sheet pile in a layer: discharge by conformal mapping (Harr 1962), with depths stretched in anisotropic
+/// soil. Half of the section is modelled: the head below the pile is the mean of both sides.
 #[test]
 fn sheet_pile() {
     const DEPTH: f64 = 10.0;
-    // Spacings are alike where the stretched section is.
+    // Spacings are equal in the stretched section.
     for (ratio, width, spacing) in [(1.0, 30.0, 0.25), (9.0, 60.0, 0.5), (1.0 / 9.0, 10.0, 0.1)] {
         for part in [0.25, 0.5, 0.75] {
             let k = Conductivity {
@@ -139,7 +140,7 @@ fn sheet_pile() {
 }
 
 /// A channel of soil whose layers are inclined: far from its ends water flows along it, by the conductivity
-/// `det k / k_yy`. Beside its walls heads err by a share of a spacing, so what is missing falls with the spacing.
+/// `det k / k_yy`. Errors of the head beside the walls are in proportion to the spacing.
 #[test]
 fn channel_of_inclined_layers() {
     for (ratio, angle) in [(10.0, 30.0_f64), (100.0, -20.0), (10.0, 90.0)] {
@@ -165,8 +166,8 @@ fn channel_of_inclined_layers() {
     }
 }
 
-/// A bank between two ditches under rain, with and without a drain in its middle: all the rain comes out, a drain takes
-/// its share and lowers the water; rain beyond what soil can take runs off.
+/// A bank between two ditches under rain, with and without a drain in its middle: all the rain flows out; a
+/// drain takes a part of it and lowers the water table; rain beyond the capacity of the soil runs off.
 #[test]
 fn rain_drains_and_runoff() {
     let bank = |rain: f64, drained: bool| {
@@ -196,9 +197,9 @@ fn rain_drains_and_runoff() {
     assert!(flooded[2] > 0.0 && flooded[2] < 0.05 * 20.0 * 1e-3);
 }
 
-/// One-dimensional Richards equation by finite volumes on a fine grid with lagged conductivities and short steps, written
-/// without anything of the solver: saturation in each of `cells` from below. The top takes `rain`, or stays at zero
-/// pressure where that is infinite; the base is at zero pressure or closed.
+/// One-dimensional Richards equation by finite volumes on a fine grid with lagged conductivities and short
+/// steps, independent of the solver: saturation in each of `cells` from the base upwards. The top takes
+/// `rain`, or is at zero pressure if `rain` is infinite; the base is at zero pressure or closed.
 fn richards(
     curve: &VanGenuchten,
     (height, cells): (f64, usize),
@@ -221,7 +222,7 @@ fn richards(
             for i in 0..cells {
                 let now = curve.at(h[i]);
                 let storage = porosity * dz / dt;
-                // A little compressibility, as water has.
+                // A small compressibility, as that of water.
                 let slope = now.capacity + 1e-5;
                 main[i] += storage * slope;
                 right[i] -= storage * (now.saturation - old[i].saturation);
@@ -272,7 +273,7 @@ fn richards(
 
 /// Infiltration from a pond and by rain into dry sand, and drainage of a full column, against the fine solution.
 #[test]
-fn columns_that_wet_and_drain() {
+fn infiltration_and_drainage_of_columns() {
     const SPACING: f64 = 0.05;
     const HEIGHT: f64 = 1.0;
     const K: f64 = 1e-4;
@@ -304,7 +305,7 @@ fn columns_that_wet_and_drain() {
         let mean = |row: usize| fine[per * row..per * (row + 1)].iter().sum::<f64>() / per as f64;
         let rms =
             ((0..rows).map(|r| (saturation[2 * r] - mean(r)).powi(2)).sum::<f64>() / rows as f64).sqrt();
-        // Water above a front's place moves with it: the difference of the contents over the step of saturation.
+        // Position error of a front: the difference of the water contents over the jump of saturation.
         let difference: f64 = (0..rows).map(|r| saturation[2 * r] - mean(r)).sum::<f64>() * SPACING;
         let span = saturation.iter().fold(0.0_f64, |a, b| a.max(*b))
             - saturation.iter().fold(1.0_f64, |a, b| a.min(*b));
@@ -320,8 +321,8 @@ fn columns_that_wet_and_drain() {
     }
 }
 
-/// A drain across a column takes what flows down to it from the head above; its place is a node's, so the way is wrong by
-/// a part of a spacing.
+/// A drain across a column takes the flow from the head above. It acts at nodes, so the length of the path
+/// has an error of a part of a spacing.
 #[test]
 fn drain_across_a_column() {
     let errors = [0.5, 0.25, 0.125].map(|spacing| {
@@ -337,9 +338,9 @@ fn drain_across_a_column() {
     }
 }
 
-/// The ends of what can be asked: each ends with its water accounted for and heads between those that drive it.
+/// Extreme input: each case ends with a closed water balance and heads between those of the conditions.
 #[test]
-fn ends_of_the_range() {
+fn extreme_input_keeps_the_water_balance() {
     let clay = VanGenuchten::new(0.8, 1.09, 0.2, 1.0).unwrap();
     let sand = VanGenuchten::new(14.5, 2.68, 0.1, 1.0).unwrap();
     // Name, curve, conductivity, porosity, factor on the water's stiffness, duration in seconds.
@@ -358,7 +359,7 @@ fn ends_of_the_range() {
         let mut model = rectangle([6.0, 4.0], 0.5, vec![region], |_| 0);
         model.water = Some(Water { bulk_modulus: softness * WATER.bulk_modulus, ..WATER });
         let level = |value: f64| HydraulicCondition::Reservoir(Series::constant(value));
-        // Full at first, then suddenly drawn down on one side; rain on dry ground.
+        // Saturated at first, then a sudden drawdown on one side; rain on dry ground.
         let drawn =
             vec![on(&[[0.0, 0.0], [0.0, 4.0]], level(0.5)), on(&[[6.0, 0.0], [6.0, 4.0]], level(4.0))];
         let storm = HydraulicCondition::Rain(Series::constant(1e-5));

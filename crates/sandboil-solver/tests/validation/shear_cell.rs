@@ -1,4 +1,4 @@
-//! The shear cell of Section 6.1: its centre is as free as the momentum equation leaves it, and stays homogeneous.
+//! The shear cell of Section 6.1: its centre moves freely by the momentum equation, and stays homogeneous.
 
 use crate::common::numerics;
 use sandboil_soil::{
@@ -12,7 +12,7 @@ use sandboil_solver::{CellTest, Numerics, ShearCell, SolverError};
 const SHEAR_MODULUS: f64 = 2.0e4;
 const TARGET: f64 = 0.2 * 100.0;
 
-/// Small: 4 by 4 free nodes. Stresses 100 and 50 kPa.
+/// A small cell with 4 by 4 free nodes and stresses of 100 and 50 kPa.
 fn test(soil: Soil) -> CellTest {
     CellTest {
         soil,
@@ -44,7 +44,7 @@ fn sand() -> Soil {
     Soil::PM4Sand(Box::new(PM4Sand::new(parameters, Options::default()).unwrap()))
 }
 
-/// Runs to the end in one go.
+/// Runs to the end in one call.
 fn finished(test: CellTest) -> ShearCell {
     let mut cell = ShearCell::new(test, 1).unwrap();
     while !cell.advance(1000).unwrap() {}
@@ -58,7 +58,7 @@ fn last(cell: &ShearCell) -> Row {
 #[test]
 fn an_elastic_centre_is_sheared_homogeneously_and_reversed_at_its_target() {
     let cell = finished(test(elastic()));
-    // The inertial stress profile, of 0.002 of the mean stress at most, is all that is not homogeneous.
+    // The only inhomogeneity is the stress profile by inertia, at most 0.002 of the mean stress.
     let inertia = 0.002 * 75.0;
     let largest = cell.largest_departure();
     assert!(largest.tau_spread < inertia);
@@ -69,7 +69,8 @@ fn an_elastic_centre_is_sheared_homogeneously_and_reversed_at_its_target() {
     let turns: Vec<&Row> =
         rows.windows(2).filter(|pair| pair[1].turns > pair[0].turns).map(|pair| &pair[1]).collect();
     assert_eq!(turns.len(), 5);
-    // A thousandth may be passed; the centre's inertia adds to it, and like any sudden load up to twice its share.
+    // An overshoot of a thousandth is allowed; the inertia of the centre adds up to twice its static share,
+    // as any sudden load does.
     let most = 1.001 * TARGET + 2.0 * inertia;
     for (k, row) in turns.into_iter().enumerate() {
         let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
@@ -81,10 +82,11 @@ fn an_elastic_centre_is_sheared_homogeneously_and_reversed_at_its_target() {
     assert!(peak < most, "{peak}");
 }
 
-/// Nodes that are pushed no further keep a linear field to round-off, free ones included: the operators see no edge.
+/// At a constant rate the field stays linear to round-off at free nodes too: the edge of the block does not
+/// affect them.
 #[test]
-fn at_a_steady_rate_the_centre_follows_to_round_off() {
-    // So slow a largest rate that it is reached after a hundredth of the first loading.
+fn at_a_constant_rate_the_field_is_linear_to_round_off() {
+    // The largest rate is so slow that it is reached after a hundredth of the first loading.
     let test = CellTest { strain_step: 1e-8, inertia: 1e-6, ..test(elastic()) };
     let mut cell = ShearCell::new(test, 1).unwrap();
     cell.advance(400).unwrap();
@@ -93,7 +95,7 @@ fn at_a_steady_rate_the_centre_follows_to_round_off() {
     assert!(spread < 1e-8 * gamma, "{spread} {gamma}");
 }
 
-/// Uniform stress puts no force on the free nodes, whatever its size: they stay where they are.
+/// A uniform stress of any size exerts no force on the free nodes: they do not move.
 #[test]
 fn a_uniform_stress_moves_nothing() {
     let mut cell = ShearCell::new(CellTest { strain_step: 1e-300, ..test(sand()) }, 1).unwrap();
@@ -107,14 +109,14 @@ fn sand_loses_its_confinement_and_its_centre_stays_homogeneous() {
     let cell = finished(test(sand()));
     let Row { stress, void_ratio, .. } = last(&cell);
     assert!(-stress.yy < 70.0, "{stress:?}");
-    // That of D_r 0.35 between 0.8 and 0.5, at constant volume.
+    // The void ratio at D_r 0.35 between 0.8 and 0.5, at constant volume.
     assert!((void_ratio.unwrap() - 0.695).abs() < 1e-5, "{void_ratio:?}");
     let largest = cell.largest_departure();
     assert!(largest.tau_spread < 0.002 * 75.0 && largest.volume_strain < 2e-5, "{largest:?}");
 }
 
 #[test]
-fn soil_that_no_free_node_feels_changes_no_bit() {
+fn stress_nodes_that_do_not_act_on_free_nodes_change_no_bit() {
     let few = finished(test(sand()));
     let every = finished(CellTest { every_stress_node: true, ..test(sand()) });
     assert_eq!(few.record().rows(), every.record().rows());
@@ -126,7 +128,7 @@ fn soil_that_no_free_node_feels_changes_no_bit() {
 }
 
 #[test]
-fn a_block_whose_edge_the_centre_feels_is_refused() {
+fn a_block_too_small_for_its_centre_is_refused() {
     let refused = ShearCell::new(CellTest { size: 0.24, ..test(sand()) }, 1);
     assert!(matches!(refused, Err(SolverError::InvalidInput { name: "size", .. })));
     let refused = ShearCell::new(CellTest { inertia: f64::NAN, ..test(sand()) }, 1);

@@ -1,4 +1,5 @@
-//! Switches between stages: what gravity leaves, that the compliant base starts nothing, and that shaking goes on.
+//! Switches between stages: the state after gravity, the start of the compliant base without motion, and
+//! further stages of shaking.
 
 use crate::common::{column, elastic, shaking};
 use sandboil_soil::{
@@ -27,7 +28,8 @@ fn sand_column(operators: Operators) -> Model {
     model
 }
 
-/// The same under a crust and on a subsoil that are elastic, with corrected inertia and hence sharp contacts.
+/// The same column between an elastic crust and an elastic subsoil, with corrected inertia and hence sharp
+/// contacts.
 fn layered_sand_column(crust: f64) -> Model {
     let mut model = sand_column(Operators::Conservative);
     for (region, x) in model.region.iter_mut().zip(&model.position) {
@@ -48,7 +50,8 @@ pub fn at_rest(model: &Model) -> Simulation {
     simulation
 }
 
-/// Standing on dashpots for 100 s moves nothing: stored reactions include the whole residual, to the last bit.
+/// The column does not move on dashpots for 100 s: stored reactions include the whole residual, to the last
+/// bit.
 #[test]
 fn nothing_moves_after_the_switch_to_the_compliant_base() {
     const DAMPING: Rayleigh = Rayleigh { ratio: 0.005, frequencies: [1.0, 10.0] };
@@ -75,7 +78,7 @@ fn nothing_moves_after_the_switch_to_the_compliant_base() {
     }
 }
 
-/// Geostatic stress relaxes to a state that differs from the exact one by the outer rows' weights only.
+/// Geostatic stress relaxes to a state that differs from the exact one only by the weights of the outer rows.
 #[test]
 fn gravity_keeps_the_geostatic_state() {
     let mut model = column(20.0, 0.2, 1, elastic(8e4, 2.4e5), Some(WATER));
@@ -94,9 +97,9 @@ fn gravity_keeps_the_geostatic_state() {
     assert!(simulation.step() < 600);
 }
 
-/// One stage of shaking or the same in two: the ground does not notice.
+/// The same shaking in one stage or in two gives the same result.
 #[test]
-fn a_second_shaking_stage_goes_on_where_the_first_ended() {
+fn a_second_shaking_stage_continues_the_first() {
     const INTERVAL: f64 = 1e-3;
     const HALF: f64 = 1.0;
     let wave = |from: f64| {
@@ -120,14 +123,14 @@ fn a_second_shaking_stage_goes_on_where_the_first_ended() {
     let (p, q) = (one.excess_pore_pressure().unwrap(), two.excess_pore_pressure().unwrap());
     let largest = p.iter().copied().fold(0.0, f64::max);
     let apart = p.iter().zip(&q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    println!("excess pore pressure up to {largest:.1} kPa, {apart:.2} kPa apart");
+    println!("excess pore pressure up to {largest:.1} kPa, difference {apart:.2} kPa");
     assert!(largest > 10.0 && apart < 0.02 * largest, "{largest} {apart}");
 }
 
-/// Sand that liquefies under a crust, soft or stiff, loses stiffness that its sharp contacts were made for: its waves stay
-/// bounded, and pore pressure is that of contacts which are not sharp.
+/// Sand that liquefies under a soft or stiff crust becomes softer than its sharp contacts assume: waves stay
+/// bounded, and pore pressure is that without sharp contacts.
 #[test]
-fn sharp_contacts_bear_liquefaction() {
+fn sharp_contacts_are_stable_in_liquefaction() {
     for crust in [5e3, 1e5] {
         let shaken = |corrected: bool| {
             let mut model = layered_sand_column(crust);
@@ -153,9 +156,9 @@ fn sharp_contacts_bear_liquefaction() {
     }
 }
 
-/// A step far too long is reported as soon as it strains sand beyond reason.
+/// A step that is far too long is reported at the first excessive strain.
 #[test]
-fn a_bursting_sand_column_is_told_at_once() {
+fn a_diverging_sand_column_is_reported_at_once() {
     let mut simulation = at_rest(&sand_column(Operators::Conservative));
     let velocity = (0..2000).map(|k| 0.5 * (0.03 * f64::from(k)).sin()).collect();
     let mut stage = shaking(Some(UpgoingWave::shear(1e-3, velocity)), 2.0, Vec::new());
@@ -165,9 +168,9 @@ fn a_bursting_sand_column_is_told_at_once() {
     assert!(matches!(error, SolverError::Diverged { .. }), "{error}");
 }
 
-/// A state that has lost its meaning is told before anybody can read or store it, between the checks of every few steps.
+/// A state that is not finite is reported before it can be read or stored, also between the regular checks.
 #[test]
-fn no_state_is_handed_out_that_is_none() {
+fn a_state_that_is_not_finite_is_not_returned() {
     for lost in [f64::NAN, 1e5] {
         let region = elastic(4e4, 8e4);
         let mut simulation = at_rest(&column(HEIGHT, SPACING, 1, region, Some(WATER)));
@@ -181,9 +184,9 @@ fn no_state_is_handed_out_that_is_none() {
     }
 }
 
-/// Envelopes hold the largest value of every step, not only of those that anybody looks at.
+/// Envelopes hold the largest value over all steps, not only over steps with output.
 #[test]
-fn envelopes_see_every_step() {
+fn envelopes_include_every_step() {
     let mut simulation = at_rest(&sand_column(Operators::Conservative));
     let velocity = (0..500).map(|k| 0.3 * (0.02 * f64::from(k)).sin()).collect();
     let mut stage = shaking(Some(UpgoingWave::shear(1e-3, velocity)), 0.5, Vec::new());
@@ -193,7 +196,7 @@ fn envelopes_see_every_step() {
     let mut pressure = simulation.excess_pore_pressure().unwrap();
     let mut strain = vec![0.0_f64; pressure.len()];
     while !simulation.is_complete() {
-        // An envelope takes the state that its step begins with.
+        // An envelope takes the state at the start of a step.
         for (largest, now) in pressure.iter_mut().zip(simulation.excess_pore_pressure().unwrap()) {
             *largest = largest.max(now);
         }
@@ -207,10 +210,10 @@ fn envelopes_see_every_step() {
     assert_eq!(simulation.largest_shear_strain().unwrap(), strain);
 }
 
-/// Water that can leave at the surface, but hardly does: a wide section disturbed by noise only calms down. The node below
-/// the surface is tied to the one under it, and would feed waves if its pressure pushed.
+/// Low permeability: in a wide section, noise only decays. The node below the surface is tied to the one
+/// under it; if its pressure exerted a force, waves would grow.
 #[test]
-fn a_wide_section_of_low_permeability_calms_down() {
+fn noise_decays_in_a_wide_section_of_low_permeability() {
     const NOISE: f64 = 1e-4;
     for conductivity in [1e-9, 1e-6, 1e-4] {
         for smoothing_ratio in [1.2, 1.4] {
@@ -220,7 +223,7 @@ fn a_wide_section_of_low_permeability_calms_down() {
             model.numerics.smoothing_ratio = smoothing_ratio;
             let mut simulation = at_rest(&model);
             simulation.begin(shaking(None, 4.0, Vec::new())).unwrap();
-            // A fixed sequence that looks like none.
+            // A fixed sequence of irregular values.
             let noise = |k: usize| NOISE * (12.9898 * (k as f64) + 78.233).sin();
             let velocity: Vec<[f64; 2]> =
                 (0..model.nodes()).map(|k| [noise(2 * k), noise(2 * k + 1)]).collect();
@@ -228,14 +231,14 @@ fn a_wide_section_of_low_permeability_calms_down() {
             assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
             let size = |v: [f64; 2]| v[0].hypot(v[1]);
             let largest = simulation.velocity().into_iter().map(size).fold(0.0, f64::max);
-            println!("k {conductivity} m/s, h/dx {smoothing_ratio}: {largest:.1e} m/s left of {NOISE}");
+            println!("k {conductivity} m/s, h/dx {smoothing_ratio}: {largest:.1e} m/s remain of {NOISE}");
             assert!(largest < 0.2 * NOISE, "{largest}");
         }
     }
 }
 
-/// Frictional ground at rest with a horizontal stress too small for it: the soil of shaking takes the nearest stress that
-/// it carries at every stress node, and says how often.
+/// Frictional ground at rest with a horizontal stress below the active one: at the start of shaking every
+/// stress node takes the nearest stress that it can carry, and is counted.
 #[test]
 fn stresses_at_rest_that_the_soil_cannot_carry_are_counted() {
     for (phi, share) in [(35.0, 0.0), (10.0, 1.0)] {

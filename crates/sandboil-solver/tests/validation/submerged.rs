@@ -13,11 +13,12 @@ const SPACING: f64 = 0.5;
 const DEPTH: f64 = 25.0 * SPACING;
 const ROWS: [usize; 2] = [8, 24];
 const WIDTH: [usize; 2] = [4, 48];
-/// The slope's run over its rise, and the columns of level ground before its toe.
+/// The slope's run over its rise, and the columns of level ground in front of its toe.
 const RUN: f64 = 2.5;
 const TOE: f64 = 4.0;
 
-/// Numbers in [-1, 1) that look random and are the same everywhere (Lehmer's generator with Park and Miller's constants).
+/// Pseudo-random numbers in [-1, 1), the same on every machine (Lehmer's generator with Park and Miller's
+/// constants).
 fn scatter() -> impl FnMut() -> f64 {
     const MODULUS: u64 = (1 << 31) - 1;
     let mut state: u64 = 1;
@@ -27,8 +28,8 @@ fn scatter() -> impl FnMut() -> f64 {
     }
 }
 
-/// A column with level ground, or a bank of 1:2.5 between level ground, both on a rough base between smooth walls,
-/// all nodes moved by up to `disorder` spacings.
+/// Level ground, or a slope of 1:2.5 between level ground, on a rough base between smooth walls, with all
+/// nodes displaced by up to `disorder` spacings.
 fn ground(slope: bool, disorder: f64, region: Region) -> Model {
     let mut random = scatter();
     let [low, high] = ROWS.map(|rows| rows as f64 * SPACING);
@@ -83,9 +84,9 @@ fn largest(vectors: &[[f64; 2]]) -> f64 {
     vectors.iter().map(|v| v[0].hypot(v[1])).fold(0.0, f64::max)
 }
 
-/// Grains as heavy as water, without stress: nothing is left of weight and pressure.
+/// Grains with the density of water, without stress: weight and water pressure cancel.
 #[test]
-fn still_water_carries_what_weighs_as_much() {
+fn still_water_carries_ground_of_its_density() {
     for (slope, disorder) in cases() {
         let region = Region { solid_density: WATER.unit_weight / GRAVITY, ..soil() };
         let mut simulation = Simulation::new(&ground(slope, disorder, region), 1).unwrap();
@@ -97,8 +98,8 @@ fn still_water_carries_what_weighs_as_much() {
     }
 }
 
-/// Ground comes to rest to a millionth of gravity, stays there for 100 s, and calms down from noise without damping but
-/// the filter's; the pressure on the wetted face stays that of the water over it.
+/// Ground comes to rest to a millionth of gravity and stays at rest for 100 s; noise decays with the damping
+/// of the filter alone. The pressure on the wetted surface stays that of the water above.
 #[test]
 fn ground_under_deep_water_rests() {
     const NOISE: f64 = 1e-4;

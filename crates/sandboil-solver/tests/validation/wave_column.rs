@@ -34,9 +34,9 @@ fn surface_pulse(
     surface_velocity(&model, |time| ricker(frequency, time - CENTRE), DURATION, |_| ())
 }
 
-/// Phase error of the least-squares operators, `1 - c_num/c = 5.0 (h / lambda)^2`, put through the spectrum of the
-/// pulse: the misfit that dispersion alone must leave. It is nearly the whole of what is found, so base, surface and
-/// time stepping add next to nothing.
+/// Phase error of the least-squares operators, `1 - c_num/c = 5.0 (h / lambda)^2`, weighted with the spectrum
+/// of the pulse: the misfit by dispersion alone. It is nearly the whole misfit found, so the errors of base,
+/// surface and time stepping are small.
 fn dispersion_misfit(smoothing_length: f64, frequency: f64) -> f64 {
     // Root of the spectral mean of (f/f0)^6 for the spectrum f^2 exp(-(f/f0)^2).
     const SIXTH_MOMENT_ROOT: f64 = 2.218;
@@ -44,7 +44,7 @@ fn dispersion_misfit(smoothing_length: f64, frequency: f64) -> f64 {
     2.0 * PI * frequency * delay * SIXTH_MOMENT_ROOT
 }
 
-/// Largest value of a signal, by the parabola through its largest sample and the two beside it.
+/// Largest value of a signal, from the parabola through its largest sample and the two next to it.
 fn summit(signal: &[f64]) -> f64 {
     let at = (1..signal.len() - 1).max_by(|&a, &b| signal[a].total_cmp(&signal[b])).unwrap();
     let [before, top, after] = [signal[at - 1], signal[at], signal[at + 1]];
@@ -68,10 +68,10 @@ fn ricker_pulse_on_a_compliant_base() {
             let peak = summit(&found) / 2.0 - 1.0;
             let misfit =
                 norm(&mut found.iter().zip(&exact).map(|(f, e)| f - e)) / norm(&mut exact.iter().copied());
-            // The base row of the printed set takes 2.5 % of every wave.
+            // The base row of the printed operators takes 2.5 % of every wave.
             let beside = if operators == Printed { 0.04 } else { 3e-3 };
             let expected = dispersion_misfit(spacing * ratio, frequency);
-            // What comes after the pulse has left: the reflection of the base.
+            // The signal after the pulse: the reflection of the base.
             let gone = CENTRE + HEIGHT / SPEED + 1.5 / frequency.min(5.0) + 0.2;
             let late = times.iter().zip(&found).filter(|(t, _)| **t > gone);
             let late = late.map(|(_, v)| v.abs()).fold(0.0, f64::max) / 2.0;
@@ -99,13 +99,13 @@ fn transfer_function_of_the_matched_column_is_one() {
             .map(|f| amplitude(&times, &found, f) / amplitude(&times, &outcrop, f) - 1.0)
             .into_iter()
             .fold(0.0_f64, |a, b| a.max(b.abs()));
-        println!("h/dx {ratio}: transfer function off one by at most {:.2} %", 100.0 * worst);
+        println!("h/dx {ratio}: transfer function differs from one by at most {:.2} %", 100.0 * worst);
         assert!(worst <= bound, "{worst}");
     }
 }
 
-/// How far the transfer function of a matched column is from one at tenths of a hertz below 5 Hz, and below 10 Hz: so
-/// much of a wave its base returns. Compression waves come in through a base that absorbs them.
+/// Largest difference of a matched column's transfer function from one, at multiples of 0.1 Hz below 5 Hz and
+/// below 10 Hz: the reflection of its base. Compression waves enter through an absorbing base.
 fn base_errors(model: &Model, compression: bool) -> [f64; 2] {
     const FREQUENCY: f64 = 5.0;
     let upgoing = |time: f64| ricker(FREQUENCY, time - CENTRE);
@@ -126,10 +126,10 @@ fn base_errors(model: &Model, compression: bool) -> [f64; 2] {
     })
 }
 
-/// The base of a column with corrected inertia returns at most 1 % of a wave below 5 Hz and 2 % below 10 Hz, where 50
-/// spacings make a shear wave. Nor does the column delay a pulse of 10 Hz.
+/// The base of a column with corrected inertia reflects at most 1 % of a wave below 5 Hz and 2 % below 10 Hz,
+/// where a shear wavelength is 50 spacings. A pulse of 10 Hz is not delayed in the column.
 #[test]
-fn corrected_inertia_meets_the_base() {
+fn the_base_reflects_little_with_corrected_inertia() {
     for ratio in [1.4, 1.2, 1.0] {
         let mut model = uniform(Operators::Conservative, 0.2, ratio);
         model.numerics.dispersion_correction = true;
@@ -165,8 +165,8 @@ fn corrected_inertia_does_not_damp() {
     assert!(ratio.abs() < 1e-5, "{ratio}");
 }
 
-/// Local damping (Eq. 16) of strength `xi` is a damping ratio `xi / pi` at any frequency, beside the
-/// trace that the nearly rigid base lets out.
+/// Local damping (Eq. 16) of strength `xi` is a damping ratio `xi / pi` at any frequency, besides the small
+/// radiation through the nearly rigid base.
 #[test]
 fn local_damping_is_a_ratio_of_xi_over_pi() {
     const XI: f64 = 0.05;

@@ -1,4 +1,4 @@
-//! Shear waves in columns without weight: how they are driven and read.
+//! Shear waves in columns without weight: input and output.
 
 use crate::common::shaking;
 use sandboil_solver::{HalfSpace, Model, Shaking, Simulation, UpgoingWave};
@@ -11,7 +11,7 @@ pub fn ricker(frequency: f64, time: f64) -> f64 {
     (1.0 - 2.0 * x) * (-x).exp()
 }
 
-/// The same column without weight: initial stress turns with the soil and would change its wave speed.
+/// The same column without weight: initial stress, which rotates with the soil, would change its wave speed.
 pub fn weightless(mut model: Model) -> Model {
     const LITTLE: f64 = 1e-9;
     model.gravity *= LITTLE;
@@ -24,8 +24,8 @@ pub fn weightless(mut model: Model) -> Model {
     model
 }
 
-/// Velocity at the surface of a column under an upgoing wave, horizontal, or vertical if that is what `adjust` makes of
-/// the wave: times and values.
+/// Velocity at the surface of a column under an upgoing wave, horizontal, or vertical if `adjust` makes the
+/// wave vertical: times and values.
 pub fn surface_velocity(
     model: &Model,
     upgoing: impl Fn(f64) -> f64,
@@ -61,14 +61,15 @@ pub fn amplitude(times: &[f64], values: &[f64], frequency: f64) -> f64 {
     f64::hypot(re, im)
 }
 
-/// Damping ratio of a column's free vibration on a nearly rigid base, driven gently at the period of its first
-/// mode and left alone.
+/// Damping ratio of a column's free vibration on a nearly rigid base, after weak excitation at the period of
+/// its first mode.
 pub fn damping_ratio(model: &Model, period: f64, adjust: impl Fn(&mut Shaking)) -> f64 {
-    // Resonance must stay within small strains, m/s.
+    // Velocity for which strains stay small in resonance, m/s.
     const SMALL: f64 = 1e-3;
     const RIGID: HalfSpace = HalfSpace { shear_speed: 1e8, compression_speed: None, density: 2.0 };
     const CYCLES: f64 = 5.0;
-    // A smooth start and end of the drive leave the higher modes at rest: theirs would disturb the sign of v.
+    // Excitation starts and ends smoothly, so that higher modes stay at rest: they would disturb the sign of
+    // v.
     let driven = 8.0 * period;
     let push = |time: f64| {
         let envelope = if time < driven { (PI * time / driven).sin().powi(2) } else { 0.0 };
