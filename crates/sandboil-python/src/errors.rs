@@ -1,10 +1,11 @@
-//! Core errors as Python exceptions. The classes live in `sandboil._errors`; here they are looked up and filled.
+//! Core errors as Python exceptions. The classes live in `sandboil._errors`; they are imported and filled
+//! here.
 
 use pyo3::{prelude::*, types::PyDict};
 use sandboil_solver::{SolverError, StateError};
 use std::path::Path;
 
-/// A solver error on its way to Python.
+/// A solver error, to be raised in Python.
 pub struct CoreError(pub SolverError);
 
 impl From<CoreError> for PyErr {
@@ -43,7 +44,7 @@ fn exception(py: Python<'_>, error: SolverError) -> PyResult<PyErr> {
     Ok(PyErr::from_value(raised))
 }
 
-/// What is wrong with the stored state in a file.
+/// An error of the stored state in a file.
 pub fn state_error(py: Python<'_>, path: &Path, error: &StateError) -> PyResult<PyErr> {
     let classes = py.import("sandboil._errors")?;
     let raised = match error {

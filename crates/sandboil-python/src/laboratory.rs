@@ -1,4 +1,4 @@
-//! The laboratory's specimen: a material point under test, of a model of ours or of one written in Python.
+//! The laboratory's specimen: a material point under test, with a built-in model or one written in Python.
 
 use crate::material::{integrator, refused, soil};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray, ndarray::Array2};
@@ -10,7 +10,7 @@ use sandboil_soil::{
 };
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// An exception that a Python model raised while the core was driving it.
+/// An exception that a Python model raised when the core called it.
 type Raised = Arc<Mutex<Option<PyErr>>>;
 
 /// A model written in Python: an object with `initialise`, `update`, `stress` and `moduli` (`sandboil.lab`).
@@ -18,7 +18,7 @@ struct PythonPoint {
     model: Py<PyAny>,
     state: Py<PyAny>,
     marked: Py<PyAny>,
-    /// Stress and moduli of the state, and of the marked one.
+    /// Stress and moduli of the state and of the marked state.
     read: (Stress, Moduli),
     marked_read: (Stress, Moduli),
     raised: Raised,
@@ -137,7 +137,7 @@ fn turn((kind, value): (String, f64)) -> PyResult<Turn> {
 
 #[pymethods]
 impl Specimen {
-    /// `material` is a dictionary of ours or an object with the methods of a Python model.
+    /// `material` is the dictionary of a built-in model or an object with the methods of a Python model.
     #[new]
     #[pyo3(signature = (material, stress, void_ratio, *, scheme, tolerance=None, max_increment=None))]
     fn new(
@@ -163,8 +163,8 @@ impl Specimen {
         Ok(Self { inner, raised })
     }
 
-    /// Direct simple shear from turn to turn, each `("stress", kPa)` or `("strain", engineering)`; with `count` the
-    /// first two alternate. Returns the record and how it ended.
+    /// Direct simple shear between turns, each `("stress", kPa)` or `("strain", engineering)`; with `count`
+    /// the first two alternate. Returns the record and the reason for its end.
     #[pyo3(signature = (turns, *, drained, count=None, strain_step, strain_limit, stress_resolution, strain_resolution))]
     #[expect(clippy::too_many_arguments, reason = "keywords of the Python call")]
     fn shear<'py>(
@@ -189,8 +189,8 @@ impl Specimen {
         self.run(py, record, move |specimen, record, stop| specimen.shear(&test, record, stop))
     }
 
-    /// Leads the specimen through rows of `(xx, yy, xy)`, each component a stress (kPa) where `by_stress` says so,
-    /// else a total strain. Returns the record and how it ended.
+    /// Loads the specimen by rows of `(xx, yy, xy)`. A component is a stress (kPa) where `by_stress` is true,
+    /// else a total strain. Returns the record and the reason for its end.
     #[pyo3(signature = (rows, *, by_stress, strain_step, stress_resolution, strain_resolution))]
     fn path<'py>(
         &mut self,
@@ -207,12 +207,12 @@ impl Specimen {
         self.run(py, record, move |specimen, record, stop| specimen.path(&path, record, stop))
     }
 
-    /// Another specimen in the same state, to go on with while this one stays.
+    /// A copy of the specimen in the same state.
     fn copy(&self) -> Self {
         Self { inner: self.inner.copy(), raised: self.raised.clone() }
     }
 
-    /// Switches to reconsolidation after shaking; returns whether the model makes a difference.
+    /// Switches to reconsolidation after shaking; returns whether the model has such a mode.
     fn reconsolidate(&mut self) -> bool {
         self.inner.reconsolidate()
     }
@@ -246,7 +246,7 @@ impl Specimen {
         self.inner.point().plastic_shear_strain()
     }
 
-    /// Work done by the model, by kind, trials that were given up included.
+    /// Counts of the model's work by kind, rejected trials included.
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         for (name, value) in self.inner.report().named() {
@@ -277,7 +277,7 @@ impl Specimen {
             return Err(signal);
         }
         if let Some(raised) = self.raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            // A trial that failed and was mended by a smaller one is no failure of the test.
+            // A failed trial that a smaller one replaced is not a failure of the test.
             if matches!(ending, Ending::Refused(SoilError::Outside(_))) {
                 return Err(raised);
             }
@@ -305,7 +305,7 @@ pub fn columns<'py>(py: Python<'py>, record: &Record) -> PyResult<Bound<'py, PyD
     Ok(dict)
 }
 
-/// How a test ended: `complete`, `strain limit`, or a reason in words.
+/// Why a test ended: `complete`, `strain limit`, or another reason as text.
 fn told(ending: &Ending) -> String {
     match ending {
         Ending::Complete => "complete".into(),
@@ -320,15 +320,15 @@ fn told(ending: &Ending) -> String {
     }
 }
 
-/// Whether a material can carry an effective stress `(xx, yy, xy, zz)`, kPa, tension positive, as it is.
+/// Whether a material can carry an effective stress `(xx, yy, xy, zz)`, kPa, tension positive, unchanged.
 #[pyfunction]
 pub fn carries(material: &Bound<'_, PyDict>, stress: [f64; 4]) -> PyResult<bool> {
     let soil = soil(material, false)?;
     Ok(with_model!(&soil, model => model.carries(&stress_of(stress))))
 }
 
-/// Every constant of a PM4Sand material at an initial effective stress `(xx, yy, xy, zz)`, kPa, tension positive:
-/// defaults filled in, and what follows from the stress.
+/// Every constant of a PM4Sand material at an initial effective stress `(xx, yy, xy, zz)`, kPa, tension
+/// positive: defaults included, and the constants that follow from the stress.
 #[pyfunction]
 pub fn pm4sand_constants<'py>(
     material: &Bound<'py, PyDict>,

@@ -13,7 +13,7 @@ use sandboil_soil::{
 };
 use sandboil_solver::SolverError;
 
-/// A refusal of the soil crate as the exception that tells it.
+/// An error of the soil crate as a Python exception.
 pub fn refused(error: &SoilError) -> PyErr {
     match *error {
         SoilError::InvalidParameter { name, value, expected } => {
@@ -23,7 +23,7 @@ pub fn refused(error: &SoilError) -> PyErr {
     }
 }
 
-/// The value of a key, `None` where it is absent or said to be none.
+/// The value of a key; `None` if it is absent or is Python's `None`.
 fn optional<'py, T: FromPyObjectOwned<'py>>(dict: &Bound<'py, PyDict>, key: &str) -> PyResult<Option<T>> {
     match dict.get_item(key)? {
         Some(value) if !value.is_none() => Ok(Some(value.extract().map_err(Into::into)?)),
@@ -120,7 +120,7 @@ fn total_stress(dict: &Bound<'_, PyDict>, elastic: Elastic) -> PyResult<TotalStr
     TotalStress::new(elastic, criterion, required(dict, "Su")?, softening).map_err(|error| refused(&error))
 }
 
-/// A soil from its dictionary; `kind` says which.
+/// A soil from its dictionary; `kind` names the model.
 pub fn soil(dict: &Bound<'_, PyDict>, gap_memory: bool) -> PyResult<Soil> {
     let elastic = || -> PyResult<Elastic> {
         Elastic::new(required(dict, "G")?, required(dict, "K")?).map_err(|error| refused(&error))
@@ -171,7 +171,7 @@ pub fn retention((alpha, n, residual, full): (f64, f64, f64, f64)) -> PyResult<V
     VanGenuchten::new(alpha, n, residual, full).map_err(|error| refused(&error))
 }
 
-/// An integrator by its name, with what the user changed of it.
+/// An integrator by its name, with the values that the user has changed.
 pub fn integrator(name: &str, tolerance: Option<f64>, max_increment: Option<f64>) -> PyResult<Integrator> {
     let max_increment = max_increment.unwrap_or(Integrator::DEFAULT_INCREMENT);
     match name {

@@ -1,4 +1,4 @@
-//! Flow through ground at rest as a Python class, driven like a simulation.
+//! Flow through ground at rest as a Python class, with the calls of a simulation.
 
 use crate::{
     errors::CoreError,
@@ -38,7 +38,7 @@ pub struct Seepage {
 
 #[pymethods]
 impl Seepage {
-    /// Starts from pore pressures (kPa); without a duration (s) it looks for the steady state.
+    /// Starts from pore pressures (kPa); without a duration (s) it computes the steady state.
     #[new]
     #[allow(clippy::needless_pass_by_value)] // arguments come from Python by value
     #[pyo3(signature = (description, pore_pressure, conditions, duration))]
@@ -59,8 +59,8 @@ impl Seepage {
         Ok(Self { inner, until, is_complete: false })
     }
 
-    /// Goes on until `until` (s) or the end, or until `steps` are made or `seconds` have passed; returns whether the
-    /// stage is over.
+    /// Continues until the time `until` (s) or the end, or until `steps` steps have been made or `seconds`
+    /// have passed; returns whether the stage is over.
     #[pyo3(signature = (*, steps, until, seconds))]
     fn advance(&mut self, py: Python<'_>, steps: u64, until: f64, seconds: f64) -> PyResult<bool> {
         let (inner, end) = (&mut self.inner, self.until);
@@ -69,7 +69,7 @@ impl Seepage {
             let start = Instant::now();
             let target = inner.counters().steps.saturating_add(steps);
             let mut arrived = false;
-            // Half a step of tolerance: looking never changes the time step.
+            // A tolerance of half a step: output does not change the time step.
             while !arrived
                 && inner.counters().steps < target
                 && (end == solver::Until::Steady || inner.time() + 0.5 * inner.time_step() < until)
@@ -123,7 +123,7 @@ impl Seepage {
         self.inner.discharge().to_pyarray(py)
     }
 
-    /// Places (x, y) along a condition's line and the inflow through each, m3/s per m: rows of three.
+    /// Points (x, y) along a condition's line and the inflow at each, m3/s per m: rows of three.
     fn outlets<'py>(&self, py: Python<'py>, condition: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let outlets = self.inner.outlets(condition);
         let flat = outlets.iter().flat_map(|(at, flow)| [at.x, at.y, *flow]).collect();

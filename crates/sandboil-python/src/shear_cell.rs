@@ -12,10 +12,10 @@ use sandboil_soil::laboratory::Resolution;
 use sandboil_solver as solver;
 use std::time::{Duration, Instant};
 
-/// Steps between looks at the clock.
+/// Steps between readings of the clock.
 const STEPS_PER_LOOK: usize = 32;
 
-/// A shear test under way. Arrays are copies; nodes row by row from the bottom.
+/// A running shear test. Arrays are copies, with nodes row by row from the bottom.
 #[pyclass(module = "sandboil._core")]
 pub struct ShearCell {
     inner: solver::ShearCell,
@@ -52,7 +52,7 @@ impl ShearCell {
         Ok(Self { inner: solver::ShearCell::new(test, threads).map_err(CoreError)? })
     }
 
-    /// Steps until `seconds` have passed or the test is over; returns whether it is.
+    /// Makes steps until `seconds` have passed or the test is over; returns whether it is over.
     fn advance(&mut self, py: Python<'_>, seconds: f64) -> PyResult<bool> {
         let inner = &mut self.inner;
         let outcome = py.detach(|| -> Result<bool, solver::SolverError> {
@@ -71,7 +71,7 @@ impl ShearCell {
         Ok(outcome.map_err(CoreError)?)
     }
 
-    /// Means over the centre, as a specimen's record.
+    /// Means over the centre, with the columns of a specimen's record.
     fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         columns(py, self.inner.record())
     }
@@ -111,7 +111,7 @@ impl ShearCell {
         self.inner.computed_stress_nodes()
     }
 
-    /// Work done, by kind.
+    /// Counts of the work done, by kind.
     fn counters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         counted(py, &self.inner.counters())
     }
