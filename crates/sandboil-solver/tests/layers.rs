@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Folders and files of the source, each free to use those before it and itself.
+/// Folders and files of the source; each may use itself and those before it.
 const LAYERS: [&str; 13] = [
     "error",
     "parallel",
@@ -37,7 +37,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The modules that a source imports from the crate, tests aside: paths in `use` trees and in the code.
+/// The modules that a source imports from the crate, without its tests: paths in `use` trees and in the code.
 fn imports(text: &str) -> BTreeSet<Vec<String>> {
     let code: String = text
         .lines()
@@ -103,7 +103,7 @@ fn modules_depend_in_one_direction() {
     let mut edges: BTreeMap<Vec<String>, BTreeSet<Vec<String>>> = BTreeMap::new();
     for (from, text) in &texts {
         let own = &from[0];
-        // Fixtures, and tests in files of their own.
+        // Fixtures, and files that contain only tests.
         if own == "testing" || from.last().unwrap().ends_with("_tests") {
             continue;
         }
@@ -113,7 +113,7 @@ fn modules_depend_in_one_direction() {
                 panic!("{}: {} is in no layer", from.join("::"), path.join("::"))
             };
             assert!(lower <= upper, "{} uses {}, a layer above it", from.join("::"), path.join("::"));
-            // The file that defines it: the longest path that is one.
+            // The file that defines it: the longest path that exists.
             let file =
                 (1..=path.len()).rev().map(|n| path[..n].to_vec()).find(|part| texts.contains_key(part));
             if let Some(file) = file.filter(|file| file != from) {
@@ -122,7 +122,7 @@ fn modules_depend_in_one_direction() {
         }
     }
     assert!(edges.len() > 30, "{}", edges.len());
-    // No circle among files: remove those that depend on nothing left, until none is left.
+    // No circle among files: files that depend on no other remaining file are removed until none remains.
     loop {
         let open: BTreeSet<_> = edges.keys().cloned().collect();
         let before = edges.len();

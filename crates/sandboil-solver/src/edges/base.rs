@@ -123,7 +123,7 @@ impl Base {
         }
     }
 
-    /// Whether the waves differ along the base, or reach it at different times.
+    /// Whether the waves differ along the base, or arrive at different times.
     pub fn has_passage(&self) -> bool {
         self.segments.len() > 1 || self.segments.iter().any(|s| s.slowness != 0.0 || s.delay != 0.0)
     }

@@ -80,21 +80,21 @@ impl<N: Neighbour> Driver<N> {
         })
     }
 
-    /// Names of the physics that a stage may compute, and whether the present stage does.
+    /// Names of the physical processes that a stage may compute, and whether the present stage computes them.
     pub fn physics(&self) -> Vec<(&'static str, bool)> {
         let Domain { ground, damping, inertia, .. } = &self.domain;
         let Ground { model, water, soil, sharpness, .. } = ground;
         let stage = self.moving();
         let base = stage.and_then(|stage| stage.stage.compliant_base());
         let is = |test: fn(&Flow) -> bool| water.as_ref().is_some_and(test);
-        let holds_air = model.saturation.iter().any(|share| *share < 1.0);
+        let is_partly_saturated = model.saturation.iter().any(|share| *share < 1.0);
         vec![
             ("pore water", model.water.is_some()),
             ("water diffusion", is(Flow::is_drained)),
             ("water acceleration", is(Flow::has_acceleration_term)),
             (
                 "partial saturation",
-                holds_air || water.as_ref().is_some_and(|flow| flow.saturation().is_some()),
+                is_partly_saturated || water.as_ref().is_some_and(|flow| flow.saturation().is_some()),
             ),
             ("soil state", soil.plastic_points() > 0),
             ("base dashpots", base.is_some()),
@@ -148,7 +148,8 @@ impl<N: Neighbour> Driver<N> {
         all.into_iter().filter_map(|(name, bytes)| bytes.map(|bytes| (name, bytes))).collect()
     }
 
-    /// Positions without periodic wrapping (virtual coordinates), m: lateral displacement is not hidden.
+    /// Positions without periodic wrapping (virtual coordinates), m: a lateral displacement larger than the
+    /// period stays visible.
     pub fn position(&self) -> Vec<[f64; 2]> {
         let ground = &self.domain.ground;
         ground.in_user_order(|j| ground.position[j].into())

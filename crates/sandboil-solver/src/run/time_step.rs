@@ -277,7 +277,7 @@ impl<'a> RegionWaves<'a> {
         let drained = self.drained();
         let damping = damping_factor(self.filter + self.rayleigh_ratio(self.undamped_drained()));
         let drainage = if self.limits.surface_is_tied { 1.0 } else { FREE_SURFACE_DRAINAGE };
-        // In anisotropic soil the smallest conductivity drains last.
+        // In anisotropic soil drainage is slowest along the smallest conductivity.
         let diffusivity = drainage * self.model.pressure_diffusivity(self.region, |k| k.minor);
         let surface_factor = (UNDRAINED_COEFFICIENT / self.undrained_coefficient()).powi(2);
         let water = surface_factor * self.water_stiffness() / self.density;

@@ -56,8 +56,7 @@ impl Geometry {
         previous: Option<Self>,
     ) -> Self {
         let kernel = WendlandQuintic::new(model.smoothing_length());
-        // Reused lists may contain nodes that have moved away from an edge, so images reach further than the
-        // kernel.
+        // Lists are reused after nodes have moved, so images are made for more nodes than the kernel reaches.
         let around =
             Surroundings::new(position, edges.outline, edges.walls, kernel.support() + 2.0 * skin(model));
         let stress_position = stress_node_positions(position, model.spacing);

@@ -41,7 +41,7 @@ impl Image {
         Self { map, strain, flow, below }
     }
 
-    /// The image of this image across another edge: beyond a corner.
+    /// The image of this image across the edge of `other`: beyond a corner.
     fn mirrored_by(self, other: Self) -> Self {
         let both = |a: [bool; 2], b: [bool; 2]| [a[0] && b[0], a[1] && b[1]];
         Self {

@@ -22,8 +22,8 @@ impl VectorWeight {
         Self { x: [gradient, Vec2::zeros()], y: [Vec2::zeros(), gradient] }
     }
 
-    /// The weight in the gradient of one component only; `map` gives the velocity that has this gradient from
-    /// that of the node.
+    /// The weight of an image in the gradient of one component; `map` gives the image's velocity from that of
+    /// its node.
     pub fn of_component(component: usize, gradient: Vec2, map: Mat2) -> Self {
         let shown = [0, 1].map(|from| gradient * map[(component, from)]);
         let nothing = [Vec2::zeros(); 2];

@@ -39,7 +39,7 @@ fn on_free_field(stage: Shaking) -> Shaking {
 /// A block between free-field sides moves as its column, everywhere and at every time.
 #[test]
 fn a_block_moves_as_its_column() {
-    for (what, water, conductivity) in
+    for (case, water, conductivity) in
         [("dry", None, 0.0), ("undrained", Some(WATER), 0.0), ("draining", Some(WATER), 1e-3)]
     {
         let mut region = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
@@ -64,7 +64,7 @@ fn a_block_moves_as_its_column() {
         let at = |row: usize, column: usize| 100.0 * apart[row * COLUMNS + column] / peak;
         let worst = apart.iter().copied().fold(0.0, f64::max) / peak;
         println!(
-            "{what}: peak {peak:.3} m/s, worst {:.3} %; corners {:.3} and {:.3} %, side {:.3} %, centre {:.3} %",
+            "{case}: peak {peak:.3} m/s, worst {:.3} %; corners {:.3} and {:.3} %, side {:.3} %, centre {:.3} %",
             100.0 * worst,
             at(0, 0),
             at(49, 0),
@@ -161,13 +161,13 @@ fn stages_and_renewals_cause_no_shock() {
     };
     let (one, builds) = run(&[(0.0, 2.0 * HALF)], None);
     let peak = one.iter().map(|v| v[0].abs()).fold(0.0, f64::max);
-    for (what, stages, limit) in [
+    for (case, stages, limit) in [
         ("two stages", vec![(0.0, HALF), (HALF, HALF)], None),
         ("renewals", vec![(0.0, 2.0 * HALF)], Some(2e-3)),
     ] {
         let (other, renewed) = run(&stages, limit);
         let apart = one.iter().zip(&other).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
-        println!("{what}: {:.2} % of {peak:.3} m/s apart, {renewed} geometries", 100.0 * apart / peak);
+        println!("{case}: {:.2} % of {peak:.3} m/s apart, {renewed} geometries", 100.0 * apart / peak);
         assert!(renewed > builds);
         assert!(apart < 0.01 * peak, "{apart}");
     }
@@ -187,10 +187,10 @@ fn a_diverged_column_is_reported_when_the_step_returns() {
     assert!(matches!(*source, SolverError::Diverged { quantity: "velocity", node: 0, .. }), "{source}");
 }
 
-/// What stands between the sides, and regions and waves that do not reach a column, are no part of its identity; its soil, its
-/// wave and the stage are.
+/// The identity of a column depends on its soil, its wave and the stage, and not on the ground between the
+/// sides or on regions and waves that do not reach it.
 #[test]
-fn a_column_is_identified_by_what_moves_it() {
+fn the_identity_of_a_column_depends_on_its_input_alone() {
     let model = block(HEIGHT, SPACING, 10, elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS), None);
     let stage = on_free_field(shaking(Some(pulse(5.0, 0.1)), 0.5, Vec::new()));
     let gravity = Gravity { tolerance: 1e-5, max_steps: 20_000 };

@@ -42,7 +42,7 @@ fn with_initial_velocity(model: &Model, velocity: impl Fn(Vec2) -> Vec2, probes:
 fn sides_absorb_waves_at_normal_incidence() {
     const SPACING: f64 = 0.25;
     const WIDTH: f64 = 20.0;
-    for (what, water, compression, bound) in [
+    for (case, water, compression, bound) in [
         ("P, dry", None, true, 0.02),
         ("S, dry", None, false, 0.02),
         ("P, undrained", Some(WATER), true, 0.02),
@@ -71,7 +71,7 @@ fn sides_absorb_waves_at_normal_incidence() {
         };
         // The pulse passes at a quarter of the width, its reflection at three quarters.
         let (out, back) = (largest(0.0, 0.5), largest(0.6, 0.9));
-        println!("{what}: {:.2} % of {out:.3} reflected, {} nodes", 100.0 * back / out, model.nodes());
+        println!("{case}: {:.2} % of {out:.3} reflected, {} nodes", 100.0 * back / out, model.nodes());
         assert!((out - 0.5).abs() < 0.02, "{out}");
         assert!(back < bound * out, "{back} {out}");
     }
@@ -88,7 +88,7 @@ fn sides_at_45_degrees() {
     const HEIGHT: f64 = 160.0;
     // Several wavelengths wide, so that little of the beam travels in other directions.
     const BEAM: f64 = 16.0;
-    for (what, compression, theory) in [("P", true, 0.070), ("S", false, 0.171)] {
+    for (case, compression, theory) in [("P", true, 0.070), ("S", false, 0.171)] {
         let region = elastic(SHEAR_MODULUS, BULK_MODULUS);
         let columns = (WIDTH / SPACING) as usize;
         let model = weightless(block(HEIGHT, SPACING, columns, region, None));
@@ -117,7 +117,7 @@ fn sides_at_45_degrees() {
         simulation.advance(u64::MAX, way / c).unwrap();
         // Half of the energy is strain energy at this time.
         let amplitude = (2.0 * energy(&simulation) / before).sqrt();
-        println!("{what} at 45 degrees: {:.1} % of the amplitude stays", 100.0 * amplitude);
+        println!("{case} at 45 degrees: {:.1} % of the amplitude stays", 100.0 * amplitude);
         assert!((amplitude - theory).abs() < 0.05, "{amplitude}");
     }
 }
@@ -257,10 +257,10 @@ fn a_travelling_wave_keeps_its_apparent_velocity() {
             (times[at], probe[at] / (2.0 * AMPLITUDE))
         };
         let [(t0, first), (t1, second)] = [arrival(&found[0]), arrival(&found[1])];
-        let seen = 0.5 * WIDTH / (t1 - t0);
+        let surface_speed = 0.5 * WIDTH / (t1 - t0);
         println!(
-            "apparent {apparent} m/s: {seen:.0} m/s at the surface, peaks {first:.3} and {second:.3} of twice the wave"
+            "apparent {apparent} m/s: {surface_speed:.0} m/s at the surface, peaks {first:.3} and {second:.3} of twice the wave"
         );
-        assert!((seen / apparent - 1.0).abs() < 0.1, "{seen}");
+        assert!((surface_speed / apparent - 1.0).abs() < 0.1, "{surface_speed}");
     }
 }

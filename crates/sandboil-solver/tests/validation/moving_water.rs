@@ -36,7 +36,7 @@ fn ramp(from: (f64, f64), to: (f64, f64)) -> Series {
 }
 
 /// A stage without waves, with enough damping to stay near equilibrium in slow changes.
-fn standing(duration: f64, conditions: Vec<MovingBoundary>) -> Shaking {
+fn without_waves(duration: f64, conditions: Vec<MovingBoundary>) -> Shaking {
     Shaking { conditions, local_damping: 0.3, ..shaking(None, duration, Vec::new()) }
 }
 
@@ -68,7 +68,7 @@ fn water_on_the_ground_weighs_through_its_pressure() {
         model.pore_pressure.iter_mut().for_each(|pressure| *pressure += pond);
         let level = HEIGHT + 6.0;
         let falling = HydraulicCondition::Reservoir(ramp((0.0, level), (0.2, level - FALL)));
-        let simulation = run(&model, standing(2.0, vec![across(HEIGHT, falling, None)]));
+        let simulation = run(&model, without_waves(2.0, vec![across(HEIGHT, falling, None)]));
         let change = -WATER.unit_weight * FALL;
         let pressure = departure(&model, &simulation.excess_pore_pressure().unwrap(), |_| change) / -change;
         // A load carried by the skeleton alone would move the surface by q H / M'.
@@ -94,7 +94,7 @@ fn sudden_water_is_shared_by_skeleton_and_pores() {
         let mut model = column(HEIGHT, spacing, 1, region, Some(soft));
         model.pore_pressure.iter_mut().for_each(|pressure| *pressure += WATER.unit_weight);
         let rising = HydraulicCondition::Reservoir(ramp((0.0, 2.0), (0.5, 2.0 + RISE)));
-        let simulation = run(&model, standing(1.0, vec![across(HEIGHT, rising, Some(2.0))]));
+        let simulation = run(&model, without_waves(1.0, vec![across(HEIGHT, rising, Some(2.0))]));
         let stiffness = BULK_MODULUS / 0.4;
         let expected = WATER.unit_weight * RISE * stiffness / (stiffness + CONFINED);
         let excess = simulation.excess_pore_pressure().unwrap();
@@ -113,7 +113,7 @@ fn a_head_at_the_base_lifts_the_ground() {
     for diffusion in [Diffusion::Implicit, Diffusion::Explicit] {
         let model = ground(1e-3, diffusion);
         let pressed = HydraulicCondition::Head(ramp((0.0, HEIGHT), (0.1, HEIGHT + HEAD)));
-        let simulation = run(&model, standing(2.0, vec![across(0.0, pressed, None)]));
+        let simulation = run(&model, without_waves(2.0, vec![across(0.0, pressed, None)]));
         let load = WATER.unit_weight * HEAD;
         let excess =
             departure(&model, &simulation.excess_pore_pressure().unwrap(), |y| load * (1.0 - y / HEIGHT));
@@ -132,7 +132,7 @@ fn an_inflow_at_the_base_raises_the_head() {
     for diffusion in [Diffusion::Implicit, Diffusion::Explicit] {
         let model = ground(CONDUCTIVITY, diffusion);
         let fed = HydraulicCondition::Flux(ramp((0.0, 0.0), (0.1, INFLOW)));
-        let simulation = run(&model, standing(4.0, vec![across(0.0, fed, None)]));
+        let simulation = run(&model, without_waves(4.0, vec![across(0.0, fed, None)]));
         let load = WATER.unit_weight * INFLOW / CONDUCTIVITY * HEIGHT;
         let excess =
             departure(&model, &simulation.excess_pore_pressure().unwrap(), |y| load * (1.0 - y / HEIGHT));
@@ -210,7 +210,7 @@ fn a_head_on_a_side_spreads_as_through_ground_at_rest() {
     at_rest.advance(Until::Steady, |_| true).unwrap();
     let moving =
         MovingBoundary { boundary: side(ramp((0.0, HEIGHT), (0.2, HEIGHT + rise))), at_rest: Some(HEIGHT) };
-    let simulation = run(&model, standing(3.0, vec![moving]));
+    let simulation = run(&model, without_waves(3.0, vec![moving]));
     let excess = simulation.excess_pore_pressure().unwrap();
     let expected = at_rest.head().into_iter().map(|head| WATER.unit_weight * (head - HEIGHT));
     let squares: f64 = excess.iter().zip(expected).map(|(q, e)| (q - e).powi(2)).sum();
@@ -229,7 +229,7 @@ fn unchanged_conditions_move_nothing() {
     }
     let pressed = across(0.0, HydraulicCondition::Head(Series::constant(1.2)), Some(1.2));
     let face = across(HEIGHT, HydraulicCondition::SeepageFace, Some(0.0));
-    let simulation = run(&model, standing(0.5, vec![pressed, face]));
+    let simulation = run(&model, without_waves(0.5, vec![pressed, face]));
     assert!(simulation.displacement().iter().flatten().all(|u| *u == 0.0));
     assert!(simulation.excess_pore_pressure().unwrap().iter().all(|q| q.abs() < 1e-12));
 }
@@ -263,7 +263,7 @@ fn ground_that_can_move_drains_as_ground_at_rest() {
     let expected = at_rest.head();
     for diffusion in [Diffusion::Explicit, Diffusion::Implicit] {
         model.numerics.diffusion = diffusion;
-        let simulation = run(&model, standing(DURATION, vec![across(0.0, falling.clone(), Some(0.6))]));
+        let simulation = run(&model, without_waves(DURATION, vec![across(0.0, falling.clone(), Some(0.6))]));
         let excess = simulation.excess_pore_pressure().unwrap();
         let head =
             |i: usize| model.position[i].y + (model.pore_pressure[i] + excess[i]) / soft_water.unit_weight;

@@ -102,7 +102,7 @@ fn reflection(water: Option<Water>, compression: bool, vertical: Vertical) -> [f
 
 #[test]
 fn the_base_reflects_little_of_any_wavelength() {
-    for (what, water, compression, vertical) in [
+    for (case, water, compression, vertical) in [
         ("S", None, false, Vertical::Roller),
         ("S, absorbing", None, false, Vertical::Absorbing),
         ("P, dry", None, true, Vertical::Absorbing),
@@ -110,11 +110,11 @@ fn the_base_reflects_little_of_any_wavelength() {
     ] {
         let [long, short] = reflection(water, compression, vertical);
         println!(
-            "{what}: {:.2} % of waves of 20 m and longer, {:.2} % of 10 to 20 m",
+            "{case}: {:.2} % of waves of 20 m and longer, {:.2} % of 10 to 20 m",
             100.0 * long,
             100.0 * short
         );
-        assert!(long <= 0.01 && short <= 0.02, "{what}: {long} {short}");
+        assert!(long <= 0.01 && short <= 0.02, "{case}: {long} {short}");
     }
     let [long, _] = reflection(None, true, Vertical::Roller);
     println!("P on a roller: {:.1} %", 100.0 * long);

@@ -154,12 +154,17 @@ fn a_stored_run_ends_with_the_same_bits() {
         let chosen = stops.iter().step_by(stops.len().div_ceil(6)).zip([2, 1, 3, 8].into_iter().cycle());
         for ((begun, bytes), threads) in chosen {
             let simulation = Simulation::restore(&case.model, threads, bytes).unwrap();
-            assert_eq!(stored(&simulation), *bytes, "{}: what is read is what was written", case.name);
+            assert_eq!(
+                stored(&simulation),
+                *bytes,
+                "{}: the restored bytes are those that were stored",
+                case.name
+            );
             let (time, step) = (simulation.time(), simulation.step());
             let resumed = run(&case, simulation, *begun, |_| ());
-            let told = format!("{} from {time} s, step {step} with {threads} threads", case.name);
-            assert!(stored(&resumed) == expected, "{told}");
-            assert_eq!(resumed.counters(), counters, "{told}");
+            let context = format!("{} from {time} s, step {step} with {threads} threads", case.name);
+            assert!(stored(&resumed) == expected, "{context}");
+            assert_eq!(resumed.counters(), counters, "{context}");
         }
         println!("{}: {} bytes, {} nodes", case.name, expected.len(), whole.nodes());
     }

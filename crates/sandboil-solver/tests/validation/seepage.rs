@@ -369,7 +369,7 @@ fn extreme_input_keeps_the_water_balance() {
         ];
         let full = model.position.iter().map(|x| 10.0 * (4.0 - x.y)).collect();
         let dry = vec![-1e4; model.nodes()];
-        for (what, pressure, boundaries) in [("drawdown", full, drawn), ("rain on dry ground", dry, rained)] {
+        for (case, pressure, boundaries) in [("drawdown", full, drawn), ("rain on dry ground", dry, rained)] {
             let mut seepage = Seepage::new(&model, &pressure, boundaries).unwrap();
             assert!(seepage.advance(Until::Time(duration), |_| true).unwrap());
             let balance = seepage.balance();
@@ -379,7 +379,7 @@ fn extreme_input_keeps_the_water_balance() {
             let (low, high) = heads.iter().fold((f64::MAX, f64::MIN), |(a, b), h| (a.min(*h), b.max(*h)));
             let lost = (balance.stored - inflow).abs() / moved.max(1e-12);
             println!(
-                "{name}, {what}: heads {low:.2} to {high:.2} m, lost {lost:.1e}, {:?}",
+                "{name}, {case}: heads {low:.2} to {high:.2} m, lost {lost:.1e}, {:?}",
                 seepage.counters()
             );
             assert!(lost < 1e-6 && low > -1001.0 && high < 4.0 + 0.01);

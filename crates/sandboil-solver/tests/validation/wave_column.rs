@@ -69,7 +69,7 @@ fn ricker_pulse_on_a_compliant_base() {
             let misfit =
                 norm(&mut found.iter().zip(&exact).map(|(f, e)| f - e)) / norm(&mut exact.iter().copied());
             // The base row of the printed operators takes 2.5 % of every wave.
-            let beside = if operators == Printed { 0.04 } else { 3e-3 };
+            let allowance = if operators == Printed { 0.04 } else { 3e-3 };
             let expected = dispersion_misfit(spacing * ratio, frequency);
             // The signal after the pulse: the reflection of the base.
             let gone = CENTRE + HEIGHT / SPEED + 1.5 / frequency.min(5.0) + 0.2;
@@ -83,7 +83,7 @@ fn ricker_pulse_on_a_compliant_base() {
                 100.0 * late
             );
             assert!(peak.abs() <= bound, "peak {peak}");
-            assert!(misfit <= 1.15 * expected + beside, "misfit {misfit}, dispersion {expected}");
+            assert!(misfit <= 1.15 * expected + allowance, "misfit {misfit}, dispersion {expected}");
             assert!(late <= 0.02, "late {late}");
         }
     }

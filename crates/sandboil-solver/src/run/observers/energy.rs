@@ -133,9 +133,9 @@ impl Energy {
         self.stress += work.mean;
     }
 
-    /// The columns of [`ENERGY_NAMES`] without the masses, from the kinetic energy and the work of the stress
-    /// `after` the last strain increment in this increment, kJ/m. The energy taken by velocity filter and
-    /// Rayleigh damping is the remainder.
+    /// The columns of [`ENERGY_NAMES`] without the masses, from the kinetic energy and the work `after` of
+    /// the last stress in the last strain increment, kJ/m. The energy taken by velocity filter and Rayleigh
+    /// damping is the remainder.
     fn columns(&self, kinetic: f64, after: f64) -> [f64; 13] {
         // Half of the last increment, with the stress after it, belongs to the next step's force.
         let stress = self.stress - 0.5 * after;
