@@ -6,7 +6,10 @@
 
 use crate::{
     error::SolverError,
-    linear::{banded::BandedLu, conjugate_gradients::conjugate_gradients},
+    linear::{
+        banded::BandedLu,
+        conjugate_gradients::{Limits, Norm, conjugate_gradients},
+    },
     section::{
         description::{Model, STRESS_NODES, Water, positive},
         node_id::id,
@@ -708,15 +711,24 @@ impl Seepage {
             };
             image.into_iter().enumerate().map(row).collect()
         };
+        let solve = |factors: &mut BandedLu, iterations: usize| {
+            let precondition = |residual: &[f64]| {
+                let mut eased = residual.to_vec();
+                factors.solve(&mut eased);
+                eased
+            };
+            let limits = Limits { norm: Norm::Preconditioned, tolerance, iterations };
+            conjugate_gradients(apply, precondition, residual, limits).ok()
+        };
         if let Some(factors) = &mut older
-            && let Some(solution) = conjugate_gradients(&apply, factors, residual, tolerance, STALE_AFTER)
+            && let Some(solution) = solve(factors, STALE_AFTER)
         {
             self.preconditioner = older;
             return Some(solution);
         }
         // The pairs alone reach half as far, so their band is half as wide.
         let mut factors = BandedLu::factor(&pairs)?;
-        let solution = conjugate_gradients(&apply, &mut factors, residual, tolerance, MOST_GRADIENTS);
+        let solution = solve(&mut factors, MOST_GRADIENTS);
         self.preconditioner = Some(factors);
         self.counters.factorings += 1;
         solution

@@ -9,6 +9,7 @@
 //! the exact transpose of strain.
 
 use crate::{
+    linear::conjugate_gradients::{Element, Limits, Norm, conjugate_gradients},
     section::{
         description::{Model, Operators, STRESS_NODES},
         outline::{Condition, EdgesView, Hand, Outline},
@@ -134,9 +135,9 @@ pub fn corrections(
         let multipliers = [0, 1].map(|direction| {
             let is_free = |slot: usize| direction == 0 && is_free_along_side[component][slot];
             let required = imbalance[component].iter().enumerate();
-            let required =
-                required.map(|(slot, both)| if is_free(slot) { [0.0; 3] } else { both[direction] });
-            solve_multipliers(&changing, component, is_free, required.collect())
+            let required: Vec<Moments> =
+                required.map(|(slot, both)| if is_free(slot) { [0.0; 3] } else { both[direction] }).collect();
+            solve_multipliers(&changing, component, is_free, &required)
         });
         for stencil in &changing {
             let [x, y] = [0, 1].map(|direction| stencil.change(component, &multipliers[direction]));
@@ -199,7 +200,7 @@ impl Stencil {
         let mut change: Vec<f64> = self
             .parts
             .iter()
-            .map(|part| part.map[(component, component)] * dot(&part.moments, &multipliers[part.slot]))
+            .map(|part| part.map[(component, component)] * part.moments.dot(&multipliers[part.slot]))
             .collect();
         let (mut mean, mut gradient) = (0.0, Vec2::zeros());
         for (part, value) in self.parts.iter().zip(&change) {
@@ -219,7 +220,7 @@ fn solve_multipliers(
     stencils: &[Stencil],
     component: usize,
     is_free: impl Fn(usize) -> bool,
-    mut residual: Vec<Moments>,
+    imbalance: &[Moments],
 ) -> Vec<Moments> {
     let moments = |multipliers: &[Moments]| {
         let mut sum: Vec<Moments> =
@@ -227,13 +228,14 @@ fn solve_multipliers(
         for stencil in stencils {
             for (part, change) in stencil.parts.iter().zip(stencil.change(component, multipliers)) {
                 if !is_free(part.slot) {
-                    add(&mut sum[part.slot], part.map[(component, component)] * change, &part.moments);
+                    let factor = part.map[(component, component)] * change;
+                    sum[part.slot] = sum[part.slot].plus(factor, &part.moments);
                 }
             }
         }
         sum
     };
-    let mut stiffness = vec![COMPLIANCE; residual.len()];
+    let mut stiffness = vec![COMPLIANCE; imbalance.len()];
     for part in stencils.iter().flat_map(|stencil| &stencil.parts) {
         let own = part.weight.share * (1.0 - part.weight.share - part.weight.gradient.dot(&part.offset));
         for (sum, moment) in stiffness[part.slot].iter_mut().zip(part.moments) {
@@ -243,39 +245,9 @@ fn solve_multipliers(
     let preconditioned = |residual: &[Moments]| -> Vec<Moments> {
         residual.iter().zip(&stiffness).map(|(r, k)| [0, 1, 2].map(|e| r[e] / k[e])).collect()
     };
-    let product = |a: &[Moments], b: &[Moments]| a.iter().zip(b).map(|(a, b)| dot(a, b)).sum::<f64>();
-    let mut multipliers = vec![[0.0; 3]; residual.len()];
-    let mut direction = preconditioned(&residual);
-    let mut slope = product(&residual, &direction);
-    let enough = TOLERANCE * TOLERANCE * product(&residual, &residual);
-    for _ in 0..MOST_ITERATIONS {
-        if product(&residual, &residual) <= enough {
-            break;
-        }
-        let product_of_direction = moments(&direction);
-        let step = slope / product(&direction, &product_of_direction);
-        for k in 0..residual.len() {
-            add(&mut multipliers[k], step, &direction[k]);
-            add(&mut residual[k], -step, &product_of_direction[k]);
-        }
-        let next = preconditioned(&residual);
-        let slope_before = std::mem::replace(&mut slope, product(&residual, &next));
-        for (direction, next) in direction.iter_mut().zip(next) {
-            let before = std::mem::replace(direction, next);
-            add(direction, slope / slope_before, &before);
-        }
-    }
-    multipliers
-}
-
-fn dot(a: &Moments, b: &Moments) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn add(sum: &mut Moments, factor: f64, more: &Moments) {
-    for (sum, more) in sum.iter_mut().zip(more) {
-        *sum += factor * more;
-    }
+    let limits = Limits { norm: Norm::Residual, tolerance: TOLERANCE, iterations: MOST_ITERATIONS };
+    // Where the limit of iterations ends the search, weights that are nearly in balance are still better than others.
+    conjugate_gradients(moments, preconditioned, imbalance, limits).unwrap_or_else(|nearly| nearly)
 }
 
 #[cfg(test)]
