@@ -32,7 +32,7 @@ use crate::{
         stage::{Displacements, End, Stage, Surface, WaterReference},
     },
     water::{
-        pore_pressure::{Flow, FlowScheme},
+        pore_pressure::{Flow, FlowScheme, Pores},
         still_water::StillWater,
     },
     weights::balance,
@@ -353,7 +353,8 @@ impl Domain {
             |node| saturation.as_ref().map_or_else(|| model.saturation(node), |of_node| of_node(node)) < 1.0;
         let holds_air = nodes.clone().map(holds_air).collect();
         let excess: Vec<f64> = nodes.map(|node| before.map_or(0.0, |flow| flow.excess(node))).collect();
-        flow.stand_in(still, self.ground.view(outline), (neutral, &excess), holds_air);
+        let pores = Pores { neutral, excess: &excess, holds_air };
+        flow.stand_in(still, self.ground.view(outline), pores);
         Ok(())
     }
 

@@ -23,7 +23,10 @@ use crate::{
         strain_and_force::{NodalShare, motion},
         viscosity::{MovingNodes, Viscosity},
     },
-    water::still_water::suction_and_pressure,
+    water::{
+        pore_pressure::{SkeletonMotion, TimeStep},
+        still_water::suction_and_pressure,
+    },
     weights::{
         geometry::Geometry,
         points::{consistent_gradient, point_weights, stress_node_positions, stress_node_values},
@@ -439,8 +442,9 @@ impl Domain {
         let Ground { water, geometry, points, velocity, acceleration, .. } = &mut self.ground;
         let (Some(flow), Some(tables)) = (water, &geometry.flow) else { return Ok(()) };
         self.counters.flow_calls += 1;
-        let times = (self.clock.time + dt, dt);
-        if flow.step(self.threaded, tables, points, (velocity, acceleration), times) {
+        let motion = SkeletonMotion { velocity, acceleration };
+        let time = TimeStep { end: self.clock.time + dt, dt };
+        if flow.step(self.threaded, tables, points, motion, time) {
             Ok(())
         } else {
             Err(self.diverged("pore pressure matrix", 0, f64::NAN))

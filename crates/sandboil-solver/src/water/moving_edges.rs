@@ -171,13 +171,14 @@ impl WaterEdges {
         self.surface.get(node).copied().unwrap_or(0.0)
     }
 
-    /// Node, excess pressure (kPa) and inflow per pressure, 1/(kPa s) of its volume, of every drain that runs.
-    pub fn drains(&self) -> impl Iterator<Item = (usize, f64, f64)> {
+    /// Every drain that runs.
+    pub fn drains(&self) -> impl Iterator<Item = RunningDrain> {
         let runs = |&&(_, cell, _): &&(u32, u32, f64)| self.holds[cell as usize];
-        self.drains
-            .iter()
-            .filter(runs)
-            .map(|&(node, cell, open)| (node as usize, self.value[cell as usize], open))
+        self.drains.iter().filter(runs).map(|&(node, cell, conductance)| RunningDrain {
+            node: node as usize,
+            pressure: self.value[cell as usize],
+            conductance,
+        })
     }
 
     /// Water that conditions bring to a node beyond that at rest, 1/s of its volume; drains aside.
@@ -337,6 +338,17 @@ impl WaterEdges {
         }
         (table, gained)
     }
+}
+
+/// A drain's cell that takes water from its node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunningDrain {
+    /// The node.
+    pub node: usize,
+    /// Excess pressure that the drain holds, kPa.
+    pub pressure: f64,
+    /// Inflow per difference of pressure, 1/(kPa s) of the node's volume.
+    pub conductance: f64,
 }
 
 /// Whether a cell holds its head while the nodes have theirs, m.
