@@ -124,7 +124,7 @@ impl<N: Neighbour> Moving<N> {
     fn check(&mut self, domain: &mut Domain, lead: Lead) -> Result<(), SolverError> {
         self.guard(domain)?;
         if let Some(flow) = &mut domain.ground.water {
-            flow.refresh(&domain.ground.model, domain.clock.time);
+            flow.refresh(&domain.ground.model);
         }
         let limit = self.limit(domain);
         domain.counters.time_step_changes += u64::from(domain.clock.update(limit));

@@ -2,6 +2,7 @@
 
 pub mod conditions;
 pub mod conduction;
+pub mod edge_law;
 pub mod moving_edges;
 pub mod partly_saturated;
 pub mod pore_pressure;

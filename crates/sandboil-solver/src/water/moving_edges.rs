@@ -1,7 +1,8 @@
 //! Hydraulic conditions (Section 4.1) while the ground moves: excess pressure on edges, and drains.
 //!
-//! Excess counts from the state at rest, so a condition that already held there asks for what has changed since, and one
-//! that is new for its distance from what the ground shows at its edge. Lines go with the ground.
+//! Excess counts from the state at rest. The water that crosses the edges is the difference of two flows by the law of
+//! [`EdgeLaw`]: the present one, and that of the state at rest. A condition that held at rest therefore brings what has
+//! changed since. One that is new starts from the head that the ground shows at its edge. Lines move with the ground.
 
 use crate::{
     error::SolverError,
@@ -12,7 +13,8 @@ use crate::{
     },
     water::{
         conditions::{Cell, Cells, Demand, HydraulicBoundary},
-        conduction::{Across, Beyond, Conduction, between},
+        conduction::{Across, Beyond, Conduction, collected},
+        edge_law::{EdgeLaw, Nodes, OpenEdge, Seen},
     },
     weights::points::point_weights,
 };
@@ -29,11 +31,20 @@ pub struct MovingBoundary {
 
 /// Distance from a surface cell within which the ground belongs to it, in spacings.
 const REACH: f64 = 1.5;
-/// What conditions ask of the edges and of drains.
+/// Relative conductivities of the nodes of partly saturated ground.
+#[derive(Debug, Clone, Copy)]
+pub struct Relative<'a> {
+    /// In the tables of conduction.
+    pub tabled: &'a [f64],
+    /// At rest.
+    pub at_rest: &'a [f64],
+}
+
+/// Conditions on edges, and drains.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct WaterEdges {
     conditions: Vec<MovingBoundary>,
-    cells: Cells,
+    law: EdgeLaw,
     unit_weight: f64,
     /// Total head of the nodes at rest, m.
     head_at_rest: Vec<f64>,
@@ -43,24 +54,41 @@ pub struct WaterEdges {
     at_rest: Vec<Demand>,
     /// Whether a cell held a head at rest.
     held_at_rest: Vec<bool>,
-    /// Whether it holds one.
+    /// What each cell asks for.
+    now: Vec<Demand>,
+    /// Whether it holds a head.
     holds: Vec<bool>,
-    /// Excess pressure on each cell that holds a head, kPa, and inflow beyond that at rest through the others, m2/s.
+    /// Excess pressure on each cell that holds a head, kPa, and inflow beyond that prescribed at rest through the others,
+    /// m2/s.
     value: Vec<f64>,
     /// What a unit of a cell's value brings to nodes, 1/s of their volume per kPa or m2/s.
     drive: Csr<f64>,
-    /// Node and cell of drains, and inflow per excess pressure, 1/(kPa s) of the node's volume.
-    drains: Vec<(u32, u32, f64)>,
+    /// What the heads at rest bring to each node beyond what they brought at rest, 1/s of its volume; empty while cells and
+    /// conductivities are those at rest.
+    gained: Vec<f64>,
+    drains: Vec<DrainCell>,
     /// Nodes near the ground surface, and the cell on it above each.
     above: Vec<(u32, u32)>,
     /// Excess pressure on the ground surface above each node near it, kPa.
     surface: Vec<f64>,
     /// Whether every value stays zero.
     is_still: bool,
+    /// Exchange of water in the present geometry, kept where conductivities or cells can change.
+    pub conduction: Option<Conduction>,
+}
+
+/// A cell of a drain.
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
+struct DrainCell {
+    node: u32,
+    cell: u32,
+    /// Inflow per excess pressure, 1/(kPa s) of the node's volume.
+    conductance: f64,
 }
 
 impl WaterEdges {
-    /// The conditions on a section that stands where its model says.
+    /// The conditions on a section that stands where its model says. `relative` conductivities are those at rest, in partly
+    /// saturated ground.
     ///
     /// # Errors
     /// Those of [`Cells::new`].
@@ -69,9 +97,12 @@ impl WaterEdges {
         water: Water,
         conduction: &Conduction,
         conditions: &[MovingBoundary],
+        relative: Option<&[f64]>,
     ) -> Result<Self, SolverError> {
         let boundaries: Vec<_> = conditions.iter().map(|condition| condition.boundary.clone()).collect();
         let cells = Cells::new(model, &model.position, &boundaries, conduction.beyond())?;
+        let law = EdgeLaw::new(model, cells, |boundary| &boundaries[boundary].condition);
+        let cells = &law.cells;
         let head: Vec<f64> = model
             .position
             .iter()
@@ -95,7 +126,7 @@ impl WaterEdges {
                 }
             }
         };
-        let at_rest = cells.all.iter().enumerate().map(shown).collect();
+        let at_rest: Vec<Demand> = cells.all.iter().enumerate().map(shown).collect();
         let mut on_surface = vec![false; cells.all.len()];
         for (pair, found) in conduction.beyond().iter().zip(&cells.of_pair) {
             if let (true, Some(cell)) = (pair.at_surface, found[0]) {
@@ -118,45 +149,61 @@ impl WaterEdges {
         let count = cells.all.len();
         let mut edges = Self {
             conditions: conditions.to_vec(),
-            cells,
+            law,
             unit_weight: water.unit_weight,
             elevation: model.position.iter().map(|at| at.y).collect(),
             head_at_rest: head,
+            now: at_rest.clone(),
             at_rest,
             held_at_rest: Vec::new(),
-            holds: vec![true; count],
+            holds: vec![false; count],
             value: vec![0.0; count],
             drive: Csr::default(),
+            gained: Vec::new(),
             drains: Vec::new(),
             above,
             surface: Vec::new(),
             is_still: false,
+            conduction: None,
         };
-        let head = edges.head_at_rest.clone();
-        let held = |(cell, demand): (&Cell, &Demand)| is_held(demand, cell, &|node| head[node]);
-        edges.held_at_rest = edges.cells.all.iter().zip(&edges.at_rest).map(held).collect();
-        for (k, held) in edges.held_at_rest.iter_mut().enumerate() {
-            *held &= edges.conditions[edges.cells.all[k].boundary].at_rest.is_some();
-        }
-        edges.switch(0.0, &|node| head[node]);
+        edges.find_state_at_rest(conduction, relative);
         edges.look_up(0.0);
-        let goes_on = |condition: &MovingBoundary| {
+        let head = edges.head_at_rest.clone();
+        edges.switch(conduction, Nodes { head: &head, relative });
+        let continues = |condition: &MovingBoundary| {
             condition.at_rest.is_some() && condition.boundary.condition.is_constant()
         };
-        edges.is_still = edges.conditions.iter().all(goes_on) && edges.value.iter().all(|v| *v == 0.0);
+        edges.is_still = edges.conditions.iter().all(continues) && edges.value.iter().all(|v| *v == 0.0);
         if !edges.is_still {
             edges.surface = vec![0.0; model.nodes()];
-            edges.show_surface();
+            edges.update_surface();
         }
         Ok(edges)
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.cells.bytes()
+        self.law.bytes()
             + self.drive.bytes()
             + 2 * size_of_val(self.elevation.as_slice())
             + size_of_val(self.surface.as_slice())
+            + size_of_val(self.gained.as_slice())
+            + self.conduction.as_ref().map_or(0, Conduction::bytes)
+    }
+
+    /// Which cells held a head at rest: of conditions that were there.
+    fn find_state_at_rest(&mut self, conduction: &Conduction, relative: Option<&[f64]>) {
+        let was_there = |k: usize| self.conditions[self.law.cells.all[k].boundary].at_rest.is_some();
+        let may_hold: Vec<bool> = (0..self.at_rest.len()).map(was_there).collect();
+        let nodes = Nodes { head: &self.head_at_rest, relative };
+        self.law.switch(conduction.beyond(), &self.at_rest, nodes, &mut self.holds, |k| may_hold[k]);
+        self.held_at_rest.clone_from(&self.holds);
+    }
+
+    /// Whether each cell holds a head.
+    #[cfg(test)]
+    pub fn holds(&self) -> &[bool] {
+        &self.holds
     }
 
     /// Whether a condition lets no water through the ground surface above a node but what it prescribes.
@@ -173,12 +220,18 @@ impl WaterEdges {
 
     /// Every drain that runs.
     pub fn drains(&self) -> impl Iterator<Item = RunningDrain> {
-        let runs = |&&(_, cell, _): &&(u32, u32, f64)| self.holds[cell as usize];
-        self.drains.iter().filter(runs).map(|&(node, cell, conductance)| RunningDrain {
-            node: node as usize,
-            pressure: self.value[cell as usize],
-            conductance,
+        let running = self.drains.iter().filter(|drain| self.holds[drain.cell as usize]);
+        running.map(|drain| RunningDrain {
+            node: drain.node as usize,
+            pressure: self.value[drain.cell as usize],
+            conductance: drain.conductance,
         })
+    }
+
+    /// What the heads at rest bring to a node beyond what they brought at rest, 1/s of its volume.
+    #[inline]
+    pub fn gained(&self, node: usize) -> f64 {
+        self.gained.get(node).copied().unwrap_or(0.0)
     }
 
     /// Water that conditions bring to a node beyond that at rest, 1/s of its volume; drains aside.
@@ -190,154 +243,170 @@ impl WaterEdges {
         self.drive.iter_row(node).map(|(cell, weight)| weight * self.value[cell]).sum()
     }
 
-    /// What the conditions ask for at a time, s.
+    /// Sets what the conditions ask for at a time, s.
     pub fn look_up(&mut self, time: f64) {
-        let unit_weight = self.unit_weight;
         if self.is_still {
             return;
         }
-        for (k, cell) in self.cells.all.iter().enumerate() {
+        for (cell, now) in self.law.cells.all.iter().zip(&mut self.now) {
             let condition = &self.conditions[cell.boundary].boundary.condition;
-            let now = condition.demand(condition.value(time), cell.middle.y, cell.slope, unit_weight);
-            let rest = self.at_rest[k];
-            self.value[k] = if self.holds[k] {
-                unit_weight * (now.head - rest.head)
-            } else {
-                // What was held at rest let through what the state at rest lets through still; what is to hold a head does so
-                // when it is next looked at.
-                let finite = |inflow: f64| if inflow.is_finite() { inflow } else { 0.0 };
-                (finite(now.inflow) - finite(rest.inflow)) * cell.length
-            };
+            *now = condition.demand(condition.value(time), cell.middle.y, cell.slope, self.unit_weight);
         }
-        self.show_surface();
+        self.update_values();
     }
 
-    fn show_surface(&mut self) {
+    /// What the cells bring beyond what they brought at rest.
+    fn update_values(&mut self) {
+        for (k, cell) in self.law.cells.all.iter().enumerate() {
+            let (now, rest) = (self.now[k], self.at_rest[k]);
+            self.value[k] = if self.holds[k] {
+                self.unit_weight * (now.head - rest.head)
+            } else {
+                (prescribed(now) - prescribed(rest)) * cell.length
+            };
+        }
+        self.update_surface();
+    }
+
+    /// Excess pressure of the water on the ground: none is left on a cell that holds no head.
+    fn update_surface(&mut self) {
         if self.surface.is_empty() {
             return;
         }
         for &(node, cell) in &self.above {
             let cell = cell as usize;
-            self.surface[node as usize] = if self.holds[cell] { self.value[cell] } else { 0.0 };
+            self.surface[node as usize] = if self.holds[cell] {
+                self.value[cell]
+            } else {
+                let depth_at_rest = self.at_rest[cell].head - self.law.cells.all[cell].middle.y;
+                -self.unit_weight * depth_at_rest.max(0.0)
+            };
         }
     }
 
-    /// Lets one-sided conditions hold where water stands at the edge, and go where there is suction. `head` is the present
-    /// total head of the nodes, m. Returns whether one changed.
-    pub fn switch(&mut self, time: f64, head: &dyn Fn(usize) -> f64) -> bool {
-        let mut switched = false;
-        for (cell, holds) in self.cells.all.iter().zip(&mut self.holds) {
-            let condition = &self.conditions[cell.boundary].boundary.condition;
-            let asked = condition.demand(condition.value(time), cell.middle.y, cell.slope, self.unit_weight);
-            let wanted = is_held(&asked, cell, head);
-            switched |= wanted != *holds;
-            *holds = wanted;
+    /// Lets cells hold their head or take their inflow, by the present state of the nodes. Returns whether one changed.
+    pub fn switch(&mut self, conduction: &Conduction, nodes: Nodes) -> bool {
+        let switched = self.law.switch(conduction.beyond(), &self.now, nodes, &mut self.holds, |_| true);
+        if switched {
+            self.update_values();
         }
         switched
     }
 
-    /// Goes with the ground to a new geometry.
+    /// Moves the lines with the ground to a new geometry.
     pub fn follow(&mut self, conduction: &Conduction, displacement: impl Fn(u32) -> Vec2) {
-        self.cells.assign(conduction.beyond(), displacement);
+        self.law.cells.assign(conduction.beyond(), displacement);
     }
 
     /// What the node of the pair `k` sees beyond the edge in a state.
     fn seen(&self, k: usize, pair: &Beyond, state: &State) -> Seen {
-        let (i, j) = (pair.node as usize, pair.owner as usize);
-        let (mut sign, mut held, mut head) = (1.0, None, 0.0);
-        for (place, (cell, crossing)) in self.cells.of_pair[k].iter().zip(&pair.crossings).enumerate() {
-            let open = match (cell, crossing) {
-                (Some(cell), _) => {
-                    let cell = *cell as usize;
-                    let value = if state.is_rest { 0.0 } else { self.value[cell] / self.unit_weight };
-                    state.holds[cell].then(|| self.at_rest[cell].head + value)
-                }
-                // Ground without a condition is open where water stands in it.
-                (None, Some(crossing)) if place == 0 && pair.at_surface => {
-                    let is_wet = state.relative.is_none() || self.head_at_rest[j] >= self.elevation[j];
-                    (is_wet || (state.head)(j) >= crossing.foot.y)
-                        .then(|| crossing.foot.y.max(if is_wet { self.head_at_rest[j] } else { 0.0 }))
-                }
-                _ => None,
-            };
-            if let Some(open) = open {
-                (sign, held, head) = (-sign, *cell, open);
-            }
+        let mut heads = self.law.held(k, state.holds, state.demands);
+        if self.law.cells.of_pair[k][0].is_none() {
+            heads[0] = self.open_ground(pair, state.nodes);
         }
-        let soil = state.relative.map_or(1.0, |relative| between(relative, i, j));
-        if sign > 0.0 {
-            return Seen { across: Across { strength: pair.closed * soil, sign }, head: 0.0, cell: None };
-        }
-        // Water that comes in through an edge under pressure finds it full.
-        let enters = 2.0 * head > (state.head)(i) + (state.head)(j);
-        let strength = pair.open * if enters { 1.0 } else { soil };
-        Seen { across: Across { strength, sign }, head, cell: held }
+        self.law.seen(pair, heads, state.nodes)
     }
 
-    /// The exchange of water under these conditions, m/s, and what heads at rest bring to each node, m2/s. Conductivities
-    /// of partly saturated soil are `relative`.
+    /// The head on ground without a condition: it is open where water stands in it.
+    fn open_ground(&self, pair: &Beyond, nodes: Nodes) -> Option<OpenEdge> {
+        let elevation = pair.crossings[0].filter(|_| pair.at_surface)?.foot.y;
+        let owner = pair.owner as usize;
+        let at_rest = self.head_at_rest[owner];
+        let is_wet = nodes.relative.is_none() || at_rest >= self.elevation[owner];
+        let head = if is_wet { elevation.max(at_rest) } else { elevation.max(0.0) };
+        (is_wet || nodes.head[owner] >= elevation).then_some(OpenEdge { head, cell: None })
+    }
+
+    /// The exchange of water in a state, m/s, and what the heads and inflows at rest bring to each node by it, m2/s.
     fn exchange(&self, conduction: &Conduction, state: &State) -> (Csr<f64>, Vec<f64>) {
-        let seen: Vec<Seen> =
-            (0..conduction.beyond().len()).map(|k| self.seen(k, &conduction.beyond()[k], state)).collect();
-        let table = conduction.exchange(state.relative, |k| seen[k].across);
+        let beyond = conduction.beyond();
+        let seen: Vec<Seen> = beyond.iter().enumerate().map(|(k, pair)| self.seen(k, pair, state)).collect();
+        let table = conduction.exchange(state.nodes.relative, |k| seen[k].across);
         let row = |node| table.iter_row(node).map(|(j, weight)| weight * self.head_at_rest[j]).sum();
         let mut inflow: Vec<f64> = (0..table.rows()).map(row).collect();
-        for (pair, seen) in conduction.beyond().iter().zip(&seen) {
-            if seen.across.sign < 0.0 {
-                let rest = seen.cell.map_or(seen.head, |cell| self.at_rest[cell as usize].head);
+        for (pair, seen) in beyond.iter().zip(&seen) {
+            if let Some(OpenEdge { head, cell }) = seen.open {
+                let rest = cell.map_or(head, |cell| self.at_rest[cell as usize].head);
                 inflow[pair.node as usize] += 2.0 * seen.across.strength * rest;
             }
+        }
+        for (k, cell) in self.law.cells.all.iter().enumerate() {
+            let node = cell.node as usize;
+            inflow[node] += match (state.holds[k], self.law.drain(k)) {
+                (true, Some(open)) => open * (self.at_rest[k].head - self.head_at_rest[node]),
+                (true, None) => 0.0,
+                (false, _) => prescribed(self.at_rest[k]) * cell.length,
+            };
         }
         (table, inflow)
     }
 
-    /// Tables for the present state: the exchange between nodes, m/s, and what the heads at rest bring beyond what they
-    /// brought at rest, m2/s, by conductivities that have changed since.
-    pub fn tables(
+    /// Makes the tables of the present state: returns the exchange between nodes, m/s.
+    pub fn tabulate(
         &mut self,
-        model: &Model,
         conduction: &Conduction,
         inverse_volume: &[f64],
-        moisture: Option<[&[f64]; 2]>,
-        head: &dyn Fn(usize) -> f64,
-    ) -> (Csr<f64>, Option<Vec<f64>>) {
-        let unit_weight = self.unit_weight;
-        let state =
-            State { is_rest: false, relative: moisture.map(|[now, _]| now), holds: &self.holds, head };
-        let (table, mut inflow) = self.exchange(conduction, &state);
-        let gained = moisture.map(|[_, then]| {
-            let at_rest = |node: usize| self.head_at_rest[node];
-            let state =
-                State { is_rest: true, relative: Some(then), holds: &self.held_at_rest, head: &at_rest };
-            let (_, then) = self.exchange(conduction, &state);
-            inflow.iter_mut().zip(then).for_each(|(now, then)| *now -= then);
-            inflow
-        });
-        let mut drive = vec![Vec::new(); inverse_volume.len()];
-        for (k, pair) in conduction.beyond().iter().enumerate() {
-            let Seen { across, cell, .. } = self.seen(k, pair, &state);
-            if let Some(cell) = cell {
-                let node = pair.node as usize;
-                drive[node].push((cell, 2.0 * across.strength * inverse_volume[node] / unit_weight));
+        head: &[f64],
+        relative: Option<Relative>,
+    ) -> Csr<f64> {
+        let nodes = Nodes { head, relative: relative.map(|relative| relative.tabled) };
+        let state = State { nodes, holds: &self.holds, demands: &self.now };
+        let (table, mut gained) = self.exchange(conduction, &state);
+        let drive = self.drive(conduction, inverse_volume, &state);
+        if relative.is_some() || self.holds != self.held_at_rest {
+            let nodes =
+                Nodes { head: &self.head_at_rest, relative: relative.map(|relative| relative.at_rest) };
+            let at_rest = State { nodes, holds: &self.held_at_rest, demands: &self.at_rest };
+            let (_, then) = self.exchange(conduction, &at_rest);
+            for ((now, then), inverse_volume) in gained.iter_mut().zip(then).zip(inverse_volume) {
+                *now = (*now - then) * inverse_volume;
             }
+        } else {
+            gained.clear();
         }
-        self.drains.clear();
-        for (k, cell) in self.cells.all.iter().enumerate() {
-            let node = cell.node as usize;
-            if self.conditions[cell.boundary].boundary.condition.is_inside() {
-                let soil = model.regions[model.region[node] as usize].hydraulic_conductivity.minor;
-                let open = cell.drain_conductance(soil, model.spacing.y) * inverse_volume[node];
-                self.drains.push((cell.node, id(k), open / unit_weight));
-            } else if !self.holds[k] {
-                drive[node].push((id(k), inverse_volume[node]));
-            }
-        }
-        self.drive = Csr::with_capacity(drive.len(), drive.iter().map(Vec::len).sum());
-        for mut row in drive {
-            self.drive.push_row(&mut row);
-        }
-        (table, gained)
+        (self.drive, self.gained) = (drive, gained);
+        self.drains = self.drain_cells(inverse_volume);
+        table
     }
+
+    /// What a unit of each cell's value brings to the nodes; drains aside.
+    fn drive(&self, conduction: &Conduction, inverse_volume: &[f64], state: &State) -> Csr<f64> {
+        let mut rows = vec![Vec::new(); inverse_volume.len()];
+        for (k, pair) in conduction.beyond().iter().enumerate() {
+            let Seen { across, open } = self.seen(k, pair, state);
+            if let Some(OpenEdge { cell: Some(cell), .. }) = open {
+                let node = pair.node as usize;
+                rows[node].push((cell, 2.0 * across.strength * inverse_volume[node] / self.unit_weight));
+            }
+        }
+        for (k, cell) in self.law.cells.all.iter().enumerate() {
+            let node = cell.node as usize;
+            if self.law.drain(k).is_none() && !self.holds[k] {
+                rows[node].push((id(k), inverse_volume[node]));
+            }
+        }
+        collected(rows)
+    }
+
+    fn drain_cells(&self, inverse_volume: &[f64]) -> Vec<DrainCell> {
+        let of_cell = |(k, cell): (usize, &Cell)| {
+            let open = self.law.drain(k)? * inverse_volume[cell.node as usize];
+            Some(DrainCell { node: cell.node, cell: id(k), conductance: open / self.unit_weight })
+        };
+        self.law.cells.all.iter().enumerate().filter_map(of_cell).collect()
+    }
+}
+
+/// The inflow that is prescribed where no head is held, m/s. A cell with a head alone never needs it.
+fn prescribed(demand: Demand) -> f64 {
+    if demand.inflow.is_finite() { demand.inflow } else { 0.0 }
+}
+
+/// What decides how water crosses edges.
+struct State<'a> {
+    nodes: Nodes<'a>,
+    holds: &'a [bool],
+    demands: &'a [Demand],
 }
 
 /// A drain's cell that takes water from its node.
@@ -349,29 +418,6 @@ pub struct RunningDrain {
     pub pressure: f64,
     /// Inflow per difference of pressure, 1/(kPa s) of the node's volume.
     pub conductance: f64,
-}
-
-/// Whether a cell holds its head while the nodes have theirs, m.
-fn is_held(demand: &Demand, cell: &Cell, head: &dyn Fn(usize) -> f64) -> bool {
-    demand.inflow.is_infinite() || (demand.head.is_finite() && head(cell.node as usize) >= demand.head)
-}
-
-/// What decides how water crosses edges.
-struct State<'a> {
-    is_rest: bool,
-    relative: Option<&'a [f64]>,
-    holds: &'a [bool],
-    head: &'a dyn Fn(usize) -> f64,
-}
-
-/// What a node sees beyond an edge.
-#[derive(Clone, Copy)]
-struct Seen {
-    across: Across,
-    /// Head on the edge, if one stands there, m.
-    head: f64,
-    /// The cell that asks for it; none where the ground is open by itself.
-    cell: Option<u32>,
 }
 
 /// What nodes see across the edges of a section without conditions: water passes the ground surface alone.

@@ -5,7 +5,6 @@ use crate::{
     parallel::{Rows, chunks, for_each_chunk},
     section::description::{Model, Water},
     skeleton::phases::Phases,
-    water::conduction::Conduction,
 };
 use sandboil_soil::{Moisture, VanGenuchten};
 
@@ -28,10 +27,6 @@ pub struct Wetting {
     volume: Vec<f64>,
     /// Relative conductivities of the tables.
     tabled: Vec<f64>,
-    /// Exchange of water in the present geometry, unless nothing flows.
-    pub conduction: Option<Conduction>,
-    /// What the heads at rest bring to each node by conductivities that have changed, 1/s of its volume.
-    pub inflow: Vec<f64>,
     /// Stiffness of the water in the factored matrix, kPa.
     pub factored: Vec<f64>,
 }
@@ -59,8 +54,6 @@ impl Wetting {
             porosity: Vec::new(),
             volume: Vec::new(),
             tabled: Vec::new(),
-            conduction: None,
-            inflow: vec![0.0; nodes],
             factored: Vec::new(),
         };
         wetting.follow(phases);
@@ -77,8 +70,7 @@ impl Wetting {
     pub fn bytes(&self) -> usize {
         size_of_val(self.curve.as_slice())
             + 2 * size_of_val(self.present.as_slice())
-            + 7 * size_of_val(self.inflow.as_slice())
-            + self.conduction.as_ref().map_or(0, Conduction::bytes)
+            + 6 * size_of_val(self.pressure_at_rest.as_slice())
     }
 
     /// Degree of saturation.
@@ -150,10 +142,19 @@ impl Wetting {
             || stiffness.iter().zip(&self.factored).any(|(now, factored)| *now > STALE_STIFFNESS * factored)
     }
 
-    /// Relative conductivities now, from now on those of the tables, and at rest.
-    pub fn tabled(&mut self) -> [Vec<f64>; 2] {
-        self.tabled = self.present.iter().map(|moisture| moisture.relative_conductivity).collect();
-        let at_rest = self.at_rest.iter().map(|moisture| moisture.relative_conductivity);
-        [self.tabled.clone(), at_rest.collect()]
+    /// Takes the present relative conductivities over into the tables.
+    pub fn tabulate(&mut self) {
+        self.tabled.clear();
+        self.tabled.extend(self.present.iter().map(|moisture| moisture.relative_conductivity));
+    }
+
+    /// Relative conductivities of the tables.
+    pub fn tabled(&self) -> &[f64] {
+        &self.tabled
+    }
+
+    /// Relative conductivities at rest.
+    pub fn relative_at_rest(&self) -> Vec<f64> {
+        self.at_rest.iter().map(|moisture| moisture.relative_conductivity).collect()
     }
 }

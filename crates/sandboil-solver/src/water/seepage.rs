@@ -17,7 +17,8 @@ use crate::{
     },
     water::{
         conditions::{Cell, Cells, Demand, HydraulicBoundary},
-        conduction::{Conduction, Rows, between, collected, static_conduction},
+        conduction::{Across, Conduction, Rows, between, collected, static_conduction},
+        edge_law::{EdgeLaw, Nodes, OpenEdge},
     },
 };
 use sandboil_soil::{Moisture, VanGenuchten};
@@ -40,8 +41,6 @@ pub const CUT: f64 = 0.4;
 /// Switches of a cell within one step after which it stays as it is: two states that each call for the other differ by
 /// less than the tolerance of the iteration.
 pub const MOST_SWITCHES: u32 = 4;
-/// Share of a spacing's head by which a cell must miss its state before it changes it.
-pub const HYSTERESIS: f64 = 1e-6;
 /// Change of head in an iteration at which a state is steady, in spacings: flows then change in their sixth figure.
 pub const STEADY_TOLERANCE: f64 = 1e-3;
 /// Change of relative conductivity that a steady state may leave.
@@ -111,7 +110,7 @@ pub struct Seepage {
     conductivity: Vec<f64>,
     conduction: Conduction,
     boundaries: Vec<HydraulicBoundary>,
-    cells: Cells,
+    law: EdgeLaw,
     /// Whether a cell holds a head.
     holds: Vec<bool>,
     head: Vec<f64>,
@@ -173,6 +172,7 @@ impl Seepage {
         let (model, order) = sorted(model);
         let conduction = static_conduction(&model);
         let cells = Cells::new(&model, &model.position, &boundaries, conduction.beyond())?;
+        let law = EdgeLaw::new(&model, cells, |boundary| &boundaries[boundary].condition);
         let of_region = |value: &dyn Fn(&crate::section::description::Region) -> f64| -> Vec<f64> {
             model.region.iter().map(|&region| value(&model.regions[region as usize])).collect()
         };
@@ -187,8 +187,8 @@ impl Seepage {
             porosity: of_region(&|region| region.porosity),
             conductivity: of_region(&|region| region.hydraulic_conductivity.minor),
             retention: model.region.iter().map(|&region| model.regions[region as usize].retention).collect(),
-            holds: vec![false; cells.all.len()],
-            flow: vec![0.0; cells.all.len()],
+            holds: vec![false; law.cells.all.len()],
+            flow: vec![0.0; law.cells.all.len()],
             head: head.collect(),
             moisture: vec![Moisture::SATURATED; model.nodes()],
             time: 0.0,
@@ -201,7 +201,7 @@ impl Seepage {
             order,
             conduction,
             boundaries,
-            cells,
+            law,
         };
         seepage.dt = seepage.first_step();
         seepage.moisture = seepage.moisture_at(&seepage.head.clone());
@@ -317,7 +317,7 @@ impl Seepage {
                 self.moisture.iter().zip(&before.1).map(change).fold(0.0, f64::max)
             });
             if let Some(change) = solved.filter(|change| *change <= REJECTED_CHANGE * SATURATION_CHANGE) {
-                for (cell, flow) in self.cells.all.iter().zip(&self.flow) {
+                for (cell, flow) in self.law.cells.all.iter().zip(&self.flow) {
                     self.balance.inflow[cell.boundary] += flow * dt;
                 }
                 self.balance.stored +=
@@ -369,7 +369,7 @@ impl Seepage {
     /// Inflow through each boundary at the end of the last step, m3/s per m.
     pub fn discharge(&self) -> Vec<f64> {
         let mut discharge = vec![0.0; self.boundaries.len()];
-        for (cell, flow) in self.cells.all.iter().zip(&self.flow) {
+        for (cell, flow) in self.law.cells.all.iter().zip(&self.flow) {
             discharge[cell.boundary] += flow;
         }
         discharge
@@ -377,8 +377,14 @@ impl Seepage {
 
     /// Middles of the places where a boundary lets water through, and the flow through each, m3/s per m.
     pub fn outlets(&self, boundary: usize) -> Vec<(Vec2, f64)> {
-        let cells = self.cells.all.iter().zip(&self.flow);
+        let cells = self.law.cells.all.iter().zip(&self.flow);
         cells.filter(|(cell, _)| cell.boundary == boundary).map(|(cell, flow)| (cell.middle, *flow)).collect()
+    }
+
+    /// Whether each cell holds a head.
+    #[cfg(test)]
+    pub fn holds(&self) -> &[bool] {
+        &self.holds
     }
 
     /// Totals since the start.
@@ -560,45 +566,28 @@ impl Seepage {
         let mut constant = vec![0.0; self.head.len()];
         self.flow.fill(0.0);
         let demands = self.demands(time);
-        for (pair, cells) in self.conduction.beyond().iter().zip(&self.cells.of_pair) {
+        let nodes = Nodes { head: &self.head, relative: Some(relative) };
+        for (k, pair) in self.conduction.beyond().iter().enumerate() {
             let (i, j) = (pair.node as usize, pair.owner as usize);
-            // Across an edge with a head the image shows as much above it as its node lies below.
-            let (mut sign, mut offset, mut held) = (1.0, 0.0, None);
-            for cell in cells.iter().flatten().map(|&cell| cell as usize).filter(|&cell| self.holds[cell]) {
-                sign = -sign;
-                offset = 2.0 * demands[cell].head - offset;
-                held = Some(cell);
-            }
-            let strength = match held {
-                Some(cell) if sign < 0.0 => {
-                    let inward = sign * self.head[j] + offset - self.head[i];
-                    let strength =
-                        pair.open * self.edge_conductivity(relative, inward, cell, demands[cell].head, i, j);
-                    self.flow[cell] += strength * inward;
-                    strength
-                }
-                // Two heads in a corner show a node on beyond both: what passes between the edges is left to them.
-                _ => pair.closed * between(relative, i, j),
-            };
-            if sign > 0.0 {
-                offset = 0.0;
+            let seen = self.law.seen(pair, self.law.held(k, &self.holds, &demands), nodes);
+            let Across { strength, sign } = seen.across;
+            if let Some(OpenEdge { head, cell: Some(cell) }) = seen.open {
+                self.flow[cell as usize] += strength * (sign * self.head[j] + 2.0 * head - self.head[i]);
             }
             rows[i].push((pair.owner, sign * strength));
             rows[i].push((pair.node, -strength));
-            constant[i] += strength * offset;
+            constant[i] += seen.constant();
         }
-        for (k, cell) in self.cells.all.iter().enumerate() {
+        for (k, cell) in self.law.cells.all.iter().enumerate() {
             let i = cell.node as usize;
-            let inside = self.boundaries[cell.boundary].condition.is_inside();
-            match (self.holds[k], inside) {
-                (true, true) => {
-                    let open = self.drain_conductance(cell);
+            match (self.holds[k], self.law.drain(k)) {
+                (true, Some(open)) => {
                     let head = demands[k].head;
                     rows[i].push((cell.node, -open));
                     constant[i] += open * head;
                     self.flow[k] = open * (head - self.head[i]);
                 }
-                (true, false) => {}
+                (true, None) => {}
                 (false, _) => {
                     let flow = demands[k].inflow * cell.length;
                     constant[i] += flow;
@@ -609,36 +598,12 @@ impl Seepage {
         Inflow { rows, constant }
     }
 
-    /// Relative conductivity across an edge with a head: of water at the edge where it flows in, of the soil where it
-    /// flows out.
-    fn edge_conductivity(
-        &self,
-        relative: &[f64],
-        inward: f64,
-        cell: usize,
-        head: f64,
-        i: usize,
-        j: usize,
-    ) -> f64 {
-        let of_soil = between(relative, i, j);
-        if inward <= 0.0 {
-            return of_soil;
-        }
-        let Cell { node, middle, .. } = self.cells.all[cell];
-        let curve = self.retention[node as usize];
-        curve.map_or(1.0, |curve| curve.at(head - middle.y).relative_conductivity).max(of_soil)
-    }
-
     fn demands(&self, time: f64) -> Vec<Demand> {
         let demand = |cell: &Cell| {
             let condition = &self.boundaries[cell.boundary].condition;
             condition.demand(condition.value(time), cell.middle.y, cell.slope, self.water.unit_weight)
         };
-        self.cells.all.iter().map(demand).collect()
-    }
-
-    fn drain_conductance(&self, cell: &Cell) -> f64 {
-        cell.drain_conductance(self.conductivity[cell.node as usize], self.spacing)
+        self.law.cells.all.iter().map(demand).collect()
     }
 
     fn begin_cells(&mut self) {
@@ -647,39 +612,14 @@ impl Seepage {
         self.switch_cells(0.0, &relative, &mut switches);
     }
 
-    /// Lets cells that take no more than so much water hold their head or let it go. Returns whether one did.
+    /// Lets cells hold their head or take their inflow, each a limited number of times. Returns whether one changed.
     fn switch_cells(&mut self, time: f64, relative: &[f64], switches: &mut [u32]) -> bool {
         let demands = self.demands(time);
-        // What each cell would take if it held its head.
-        let mut taken = vec![0.0; demands.len()];
-        let mut strength = vec![0.0; demands.len()];
-        for (pair, cells) in self.conduction.beyond().iter().zip(&self.cells.of_pair) {
-            let (i, j) = (pair.node as usize, pair.owner as usize);
-            for k in cells.iter().flatten().map(|&cell| cell as usize) {
-                let inward = 2.0 * demands[k].head - self.head[j] - self.head[i];
-                let open = pair.open * self.edge_conductivity(relative, inward, k, demands[k].head, i, j);
-                taken[k] += open * inward;
-                strength[k] += open;
-            }
-        }
-        let mut switched = false;
-        for (k, demand) in demands.iter().enumerate() {
-            let cell = &self.cells.all[k];
-            if self.boundaries[cell.boundary].condition.is_inside() {
-                strength[k] = self.drain_conductance(cell);
-                taken[k] = strength[k] * (demand.head - self.head[cell.node as usize]);
-            }
-            let margin = HYSTERESIS * self.spacing * strength[k];
-            let most = demand.inflow * cell.length + if self.holds[k] { margin } else { -margin };
-            // Where nothing passes the edge a head would shut out what falls on it.
-            let wanted = taken[k] < most && (strength[k] > 0.0 || demand.inflow.is_infinite());
-            if wanted != self.holds[k] && switches[k] < MOST_SWITCHES {
-                self.holds[k] = wanted;
-                switches[k] += 1;
-                switched = true;
-            }
-        }
-        switched
+        let nodes = Nodes { head: &self.head, relative: Some(relative) };
+        self.law.switch(self.conduction.beyond(), &demands, nodes, &mut self.holds, |k| {
+            switches[k] += 1;
+            switches[k] <= MOST_SWITCHES
+        })
     }
 
     /// Solves `(storage - a) x = residual` by conjugate gradients; the preconditioner is an older matrix, factored.

@@ -25,7 +25,8 @@ use crate::{
     },
     water::{
         conduction::{Conduction, conduction},
-        moving_edges::{MovingBoundary, WaterEdges, open_surface},
+        edge_law::Nodes,
+        moving_edges::{MovingBoundary, Relative, WaterEdges, open_surface},
         partly_saturated::Wetting,
         still_water::StillWater,
     },
@@ -59,6 +60,9 @@ pub struct Flow {
     /// Hydraulic conductivity over gravity, s: what a unit of acceleration drives.
     mobility: Vec<Mat2>,
     unit_weight: f64,
+    /// Nodes that the surface can tie.
+    ties: Vec<SurfaceNode>,
+    /// Those that are tied: where an edge condition takes its inflow, water does not drain at the surface.
     surface: Vec<SurfaceNode>,
     /// Share of each node's excess pressure in the force: none of a node tied to the surface, all of the others.
     push: Vec<f64>,
@@ -156,32 +160,28 @@ impl Flow {
         let conductivity = |node: usize| model.regions[model.region[node] as usize].hydraulic_conductivity;
         let is_found = free_surface.is_some();
         // Ground that flows keeps the water it has above the water table.
-        let wetting = if is_found { None } else { Wetting::new(model, phases, !conditions.is_empty()) };
+        let mut wetting = if is_found { None } else { Wetting::new(model, phases, !conditions.is_empty()) };
+        wetting.iter_mut().for_each(Wetting::tabulate);
         let drained = scheme != FlowScheme::Undrained;
         let edges = if drained && (wetting.is_some() || !conditions.is_empty()) {
             // Conditions lie on the edges as they were drawn.
             let drawn = (&model.outline, walls);
             let tables = conduction(model, geometry, &model.position, &model.volume, drawn, true);
-            Some(WaterEdges::new(model, water, &tables, conditions)?)
+            let relative = wetting.as_ref().map(Wetting::tabled);
+            Some(WaterEdges::new(model, water, &tables, conditions, relative)?)
         } else {
             None
         };
         let drains = |tie: &SurfaceNode| conductivity(tie.node as usize).major > 0.0;
-        let is_sealed = |tie: &SurfaceNode| edges.as_ref().is_some_and(|edges| edges.seals(tie.node));
-        // Nothing ties the surface of ground that flows but what crosses it.
+        // Nothing ties a surface that is found but what crosses it.
         let ties = if is_found { Vec::new() } else { surface_nodes(model, water) };
-        let surface: Vec<SurfaceNode> =
-            ties.into_iter().filter(|tie| drains(tie) && !is_sealed(tie)).collect();
+        let ties = ties.into_iter().filter(drains).collect();
         // Only the acceleration term reads them.
         let mobility = if scheme == FlowScheme::ExplicitWithAcceleration {
             (0..model.nodes()).map(|node| conductivity(node).tensor() / model.gravity).collect()
         } else {
             Vec::new()
         };
-        let mut push = vec![1.0; model.nodes()];
-        for tie in &surface {
-            push[tie.node as usize] = 0.0;
-        }
         let mut flow = Self {
             excess: vec![0.0; model.nodes()],
             felt: vec![0.0; model.nodes()],
@@ -189,8 +189,9 @@ impl Flow {
             stiffness: (0..model.nodes()).map(|node| stiffness(model, phases, node)).collect(),
             mobility,
             unit_weight: water.unit_weight,
-            surface,
-            push,
+            ties,
+            surface: Vec::new(),
+            push: vec![1.0; model.nodes()],
             diffusion: None,
             inverse_volume: Vec::new(),
             edges,
@@ -204,6 +205,7 @@ impl Flow {
             },
             next: vec![0.0; model.nodes()],
         };
+        flow.update_ties();
         flow.follow(section, 0.0);
         Ok(Some(flow))
     }
@@ -228,12 +230,12 @@ impl Flow {
         if let Some(edges) = &mut self.edges {
             let displacement = |node: u32| position[node as usize] - model.position[node as usize];
             edges.follow(&conduction, displacement);
+            edges.look_up(time);
         }
-        self.switch(model, time);
-        self.tabulate(model, &conduction, free_surface, time);
-        if let Some(wetting) = &mut self.wetting {
-            wetting.conduction = Some(conduction);
-        }
+        self.wetting.iter_mut().for_each(Wetting::tabulate);
+        self.switch(model, &conduction);
+        self.tabulate(model, &conduction, free_surface);
+        self.keep(conduction);
     }
 
     /// Puts ground that flows into still water, from which its excess counts from now on. Its pores have the `neutral`
@@ -266,33 +268,41 @@ impl Flow {
         Some(position.iter().zip(volume).map(|(at, volume)| water.gradient(*at) * -volume).collect())
     }
 
-    /// Makes the tables of diffusion anew where conductivities or conditions have left them. Full soil keeps both.
-    pub fn refresh(&mut self, model: &Model, time: f64) {
-        let Some(wetting) = &mut self.wetting else { return };
-        let Some(conduction) = wetting.conduction.take() else { return };
-        let is_stale = wetting.is_stale();
-        if self.switch(model, time) || is_stale {
-            self.tabulate(model, &conduction, None, time);
-        }
-        if let Some(wetting) = &mut self.wetting {
-            wetting.conduction = Some(conduction);
+    /// Keeps the exchange of water where conductivities or cells can change between renewals: in soil that can take up air.
+    /// In full soil the pressure of every wave would switch cells; they change with the geometry alone.
+    fn keep(&mut self, conduction: Conduction) {
+        if let Some(edges) = self.edges.as_mut().filter(|_| self.wetting.is_some()) {
+            edges.conduction = Some(conduction);
         }
     }
 
-    /// Lets conditions hold and go by the present heads. Returns whether one did.
-    fn switch(&mut self, model: &Model, time: f64) -> bool {
+    /// Makes new tables of diffusion if conductivities or conditions have changed.
+    pub fn refresh(&mut self, model: &Model) {
+        let Some(conduction) = self.edges.as_mut().and_then(|edges| edges.conduction.take()) else { return };
+        let is_stale = self.wetting.as_ref().is_some_and(Wetting::is_stale);
+        if is_stale {
+            self.wetting.iter_mut().for_each(Wetting::tabulate);
+        }
+        if self.switch(model, &conduction) || is_stale {
+            self.tabulate(model, &conduction, None);
+        }
+        self.keep(conduction);
+    }
+
+    /// Lets conditions hold a head or take an inflow by the present heads. Returns whether one changed.
+    fn switch(&mut self, model: &Model, conduction: &Conduction) -> bool {
         let Some(edges) = &mut self.edges else { return false };
-        edges.switch(time, &|node| head(model, &self.excess, self.unit_weight, node))
+        set_heads(&mut self.next, model, &self.excess, self.unit_weight);
+        let relative = self.wetting.as_ref().map(Wetting::tabled);
+        let switched = edges.switch(conduction, Nodes { head: &self.next, relative });
+        if switched {
+            self.update_ties();
+        }
+        switched
     }
 
     /// The table of diffusion for the present conditions and conductivities.
-    fn tabulate(
-        &mut self,
-        model: &Model,
-        conduction: &Conduction,
-        free_surface: Option<&[Option<Vec2>]>,
-        time: f64,
-    ) {
+    fn tabulate(&mut self, model: &Model, conduction: &Conduction, free_surface: Option<&[Option<Vec2>]>) {
         if let Scheme::Implicit { factors } = &mut self.scheme {
             *factors = None;
         }
@@ -303,15 +313,12 @@ impl Flow {
             }
             (None, None) => conduction.exchange(None, open_surface(conduction)),
             (Some(edges), _) => {
-                let head = |node: usize| head(model, &self.excess, self.unit_weight, node);
-                edges.look_up(time);
-                let moisture = self.wetting.as_mut().map(Wetting::tabled);
-                let relative = moisture.as_ref().map(|all| all.each_ref().map(Vec::as_slice));
-                let (table, gained) = edges.tables(model, conduction, &self.inverse_volume, relative, &head);
-                if let (Some(wetting), Some(gained)) = (&mut self.wetting, gained) {
-                    wetting.inflow = gained.iter().zip(&self.inverse_volume).map(|(q, v)| q * v).collect();
-                }
-                table
+                set_heads(&mut self.next, model, &self.excess, self.unit_weight);
+                let at_rest = self.wetting.as_ref().map(Wetting::relative_at_rest);
+                let relative = self.wetting.as_ref().zip(at_rest.as_ref());
+                let relative =
+                    relative.map(|(wetting, at_rest)| Relative { tabled: wetting.tabled(), at_rest });
+                edges.tabulate(conduction, &self.inverse_volume, &self.next, relative)
             }
         };
         table.scale_by_row(&self.inverse_volume);
@@ -478,9 +485,9 @@ impl Flow {
                 let mut water_rate = cofactor.contract(x, y) / deformation.volume_ratio();
                 if let Some(wetting) = wetting {
                     water_rate *= wetting.saturation(node);
-                    water_rate -= wetting.inflow[node];
                 }
                 if let Some(edges) = edges {
+                    water_rate -= edges.gained(node);
                     water_rate -= edges.inflow(node);
                 }
                 // dp = (gamma_f / C) dh-rate with C = n gamma_f / K_f.
@@ -511,9 +518,11 @@ fn diffusion_rate(diffusion: &Csr<f64>, excess: &[f64], node: usize) -> f64 {
     diffusion.iter_row(node).map(|(j, weight)| weight * excess[j]).sum()
 }
 
-/// Total head of a node at an excess pressure (kPa) over that at rest, m.
-fn head(model: &Model, excess: &[f64], unit_weight: f64, node: usize) -> f64 {
-    model.position[node].y + (model.pore_pressure[node] + excess[node]) / unit_weight
+/// Total heads of the nodes at excess pressures (kPa) over those at rest, m.
+fn set_heads(head: &mut [f64], model: &Model, excess: &[f64], unit_weight: f64) {
+    for (node, head) in head.iter_mut().enumerate() {
+        *head = model.position[node].y + (model.pore_pressure[node] + excess[node]) / unit_weight;
+    }
 }
 
 /// What leaves the nodes at a free surface per metre of head in them, m/s: half a spacing from the water outside, each

@@ -32,6 +32,16 @@ impl Flow {
         outside + tie.fraction * (inner - outside)
     }
 
+    /// Ties the nodes above which no condition takes its inflow. A node that has been tied exerts no force from then on: a
+    /// row at the surface of full ground that starts to push amplifies waves.
+    pub(super) fn update_ties(&mut self) {
+        let is_sealed = |tie: &SurfaceNode| self.edges.as_ref().is_some_and(|edges| edges.seals(tie.node));
+        self.surface = self.ties.iter().copied().filter(|tie| !is_sealed(tie)).collect();
+        for tie in &self.surface {
+            self.push[tie.node as usize] = 0.0;
+        }
+    }
+
     /// Sets the excess pressure of every tied node.
     pub(super) fn hold_surface(&mut self) {
         for k in 0..self.surface.len() {
