@@ -1,4 +1,4 @@
-"""Base, sides and how waves come to them: what a scene says of them, and what the core is told."""
+"""Base, sides and how waves come to them: what a scene says of them, and what the core is given."""
 
 from __future__ import annotations
 
@@ -29,11 +29,17 @@ from sandboil import (
     Simulation,
     Water,
     WaterTable,
+    _core,
     box,
     discretise,
     polygon,
 )
-from sandboil.core.description import section_description, stage_description
+from sandboil.core.description import (
+    base_description,
+    outline_description,
+    section_description,
+    stage_description,
+)
 from sandboil.core.doubts import doubts
 from sandboil.core.motions import loaded_motions
 from sandboil.core.probes import probes_of
@@ -59,13 +65,31 @@ def shaken(*args: Any, **kwargs: Any) -> list[Gravity | Shaking]:
     return [Gravity(), Shaking(*args, **kwargs)]
 
 
-def sent(scene: Scene) -> dict[str, Any]:
-    """The shaking stage as the core takes it."""
+def base_of(scene: Scene) -> _core.Base:
+    """The base of the shaking stage as the core takes it."""
     stage, motions = scene.stages[1], loaded_motions(scene)[1]
-    probes = probes_of(scene, discretise(scene))
-    described = stage_description(scene, stage, scene.duration(stage), motions, probes)
-    assert described is not None
-    return described
+    assert isinstance(stage, Shaking)
+    assert motions is not None
+    return base_description(scene, stage, motions)
+
+
+def segment(left: float, right: float, wave: int | None, delay: float = 0.0) -> _core.BaseSegment:
+    return _core.BaseSegment(extent=(left, right), wave=wave, delay=delay, slowness=0.0)
+
+
+def wave(horizontal: Motion | None, vertical: Motion | None = None) -> _core.Wave:
+    """Half of motions at an outcrop, as they arrive at a base."""
+    halves = []
+    for motion in (horizontal, vertical):
+        if motion is None:
+            halves.append(None)
+            continue
+        interval, half = motion.upgoing_velocity()
+        assert interval == motion.dt
+        np.testing.assert_allclose(half, 0.5 * motion.velocity)
+        halves.append(np.ascontiguousarray(half))
+    first, second = halves
+    return _core.Wave(interval=interval, horizontal=np.zeros(1) if first is None else first, vertical=second)
 
 
 # Outline
@@ -213,50 +237,70 @@ def test_histories_and_profiles_follow_the_base_of_their_column() -> None:
     assert (thin, thick) == (pytest.approx(6.0), pytest.approx(12.0))
 
 
-# What the core is told
+# What the core is given
 
 
-def test_the_core_is_told_base_and_sides() -> None:
+def columns_of(scene: Scene) -> tuple[bytes | None, bytes | None]:
+    """What identifies the columns of the left and the right side in the shaking stage."""
+    particles, (gravity, shaking) = discretise(scene), scene.stages
+    probes, motions = probes_of(scene, particles), loaded_motions(scene)
+    described = [
+        stage_description(scene, stage, scene.duration(stage), loaded, probes)
+        for stage, loaded in zip((gravity, shaking), motions, strict=True)
+    ]
+    rest, moving = described
+    assert isinstance(rest, _core.Gravity)
+    assert isinstance(moving, _core.Shaking)
+    return _core.column_identities(section_description(scene, particles), rest, moving)
+
+
+def test_the_core_is_given_base_and_sides() -> None:
     scene = slope(
         sides=Sides(FreeField(), Fixed()), stages=[Gravity(base="free-slip"), Shaking(duration=1.0)]
     )
-    told = section_description(scene, discretise(scene))
-    assert told["period"] is None
-    assert told["base_support"] == "free-slip"
-    assert told["left"] == {"x": 0.0, "bottom": 0.0, "top": 12.0, "support": "roller"}
-    assert told["right"] == {"x": 40.0, "bottom": 0.0, "top": 6.0, "support": "fixed"}
-    assert sent(scene)["sides"] == ("free-field", "wall")
-    assert sent(scene)["waves"] == []
-    assert sent(scene)["base"]["segments"] == [(0.0, 40.0, None, 0.0, 0.0)]
+    assert outline_description(scene) == _core.Outline(
+        base=np.array([(0.0, 0.0), (40.0, 0.0)]),
+        base_support="free-slip",
+        left=_core.Side(x=0.0, bottom=0.0, top=12.0, support="free-slip"),
+        right=_core.Side(x=40.0, bottom=0.0, top=6.0, support="no-slip"),
+    )
+    assert section_description(scene, discretise(scene)).period is None
+    assert base_of(scene) == _core.Base(
+        vertical="roller", half_space=None, waves=[], segments=[segment(0.0, 40.0, None)]
+    )
+    # Only the left side has a column.
+    left, right = columns_of(scene)
+    assert left is not None
+    assert right is None
 
 
-def test_level_ground_is_told_as_a_period() -> None:
+def test_level_ground_is_given_as_a_period() -> None:
     scene = slope([(0, 0), (4, 0), (4, 6), (0, 6)], sides=Periodic())
-    told = section_description(scene, discretise(scene))
-    assert (told["period"], told["left"], told["right"]) == (4.0, None, None)
-    np.testing.assert_array_equal(told["base"], [(0, 0), (4, 0)])
-    stage = sent(scene)
-    ((dt, horizontal, vertical),) = stage["waves"]
-    assert (dt, vertical) == (PULSE.dt, None)
-    np.testing.assert_allclose(horizontal, 0.5 * PULSE.velocity)
-    assert stage["base"] == {
-        "vertical": "roller",
-        "half_space": None,
-        "segments": [(0.0, 4.0, 0, 0.0, 0.0)],
-    }
+    assert outline_description(scene) == _core.Outline(
+        base=np.array([(0.0, 0.0), (4.0, 0.0)]), base_support="no-slip", left=None, right=None
+    )
+    assert section_description(scene, discretise(scene)).period == 4.0
+    assert base_of(scene) == _core.Base(
+        vertical="roller", half_space=None, waves=[wave(PULSE)], segments=[segment(0.0, 4.0, 0)]
+    )
 
 
 def test_a_vertical_motion_makes_the_base_absorb() -> None:
     rock = CompliantBase(Vs=400.0, density=2.1, Vp=900.0)
-    stage = sent(slope(stages=shaken(PULSE, vertical=PULSE.scaled(factor=0.5), base=rock)))
-    ((_, horizontal, vertical),) = stage["waves"]
-    np.testing.assert_allclose(vertical, 0.5 * horizontal)
-    assert stage["base"]["vertical"] == "absorbing"
-    assert stage["base"]["half_space"] == (400.0, 900.0, 2.1)
-    ((dt, horizontal, vertical),) = sent(slope(stages=shaken(vertical=PULSE)))["waves"]
-    assert dt == PULSE.dt
-    np.testing.assert_array_equal(horizontal, [0.0])
-    np.testing.assert_allclose(vertical, 0.5 * PULSE.velocity)
+    half = PULSE.scaled(factor=0.5)
+    both = slope(stages=shaken(PULSE, vertical=half, base=rock))
+    assert base_of(both) == _core.Base(
+        vertical="absorbing",
+        half_space=_core.HalfSpace(shear_speed=400.0, compression_speed=900.0, density=2.1),
+        waves=[wave(PULSE, half)],
+        segments=[segment(0.0, 40.0, 0)],
+    )
+    assert base_of(slope(stages=shaken(vertical=PULSE))) == _core.Base(
+        vertical="absorbing",
+        half_space=None,
+        waves=[wave(None, PULSE)],
+        segments=[segment(0.0, 40.0, 0)],
+    )
 
 
 @given(velocity=st.floats(200.0, 5000.0), x=st.floats(0.0, 40.0))
@@ -272,11 +316,14 @@ def test_segments_have_their_delays_and_motions() -> None:
     own = Motion.ricker(frequency=2.0, pga_g=0.1)
     base = CompliantBase(segments=[BaseSegment((20, 40), delay=0.1, motion=own), BaseSegment((0, 20))])
     scene = slope(stages=shaken(PULSE, base=base))
-    stage = sent(scene)
-    assert stage["base"]["segments"] == [(0.0, 20.0, 0, 0.0, 0.0), (20.0, 40.0, 1, 0.1, 0.0)]
-    np.testing.assert_allclose(stage["waves"][1][1], 0.5 * own.velocity)
+    assert base_of(scene) == _core.Base(
+        vertical="roller",
+        half_space=None,
+        waves=[wave(PULSE), wave(own)],
+        segments=[segment(0.0, 20.0, 0), segment(20.0, 40.0, 1, delay=0.1)],
+    )
     # The stage lasts until the later one has passed.
-    assert stage["duration"] == pytest.approx(0.1 + own.duration)
+    assert scene.duration(scene.stages[1]) == pytest.approx(0.1 + own.duration)
 
 
 # Files

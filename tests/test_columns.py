@@ -104,6 +104,54 @@ def test_columns_of_another_scene_are_refused(
     assert not (tmp_path / "out").exists()
 
 
+def keys(base: sb.CompliantBase | None = None, **stiffness: float) -> dict[str, str]:
+    """Fingerprint of each column beside three regions, some of which have another stiffness."""
+    places = {"left": (0, 4), "middle": (4, 8), "right": (8, 12)}
+    regions = [
+        sb.Region(
+            name,
+            sb.box(x=place, y=(0, 4)),
+            sb.Elastic(G=stiffness.get(name, 2.0e4), K=4.0e4),
+            dry_unit_weight=18.0,
+        )
+        for name, place in places.items()
+    ]
+    scene = sb.Scene(
+        spacing=1.0,
+        regions=regions,
+        sides=sb.FreeField(),
+        stages=[sb.Gravity(), sb.Shaking(MOTION, base=base or sb.CompliantBase(), duration=2.0)],
+    )
+    columns = sb.Simulation(scene, threads=1, keep_columns=True)._columns
+    return {column.hand: column.fingerprint for column in columns}
+
+
+@pytest.mark.parametrize(
+    ("changed", "hands"),
+    [
+        ({"middle": 3.0e4}, set()),
+        ({"left": 3.0e4}, {"left"}),
+        ({"right": 3.0e4}, {"right"}),
+        (
+            {"base": sb.CompliantBase(segments=[sb.BaseSegment((0, 6)), sb.BaseSegment((6, 12), delay=0.1)])},
+            {"right"},
+        ),
+        (
+            {
+                "base": sb.CompliantBase(
+                    segments=[sb.BaseSegment((0, 6), motion=MOTION.flipped()), sb.BaseSegment((6, 12))]
+                )
+            },
+            {"left"},
+        ),
+        ({"base": sb.CompliantBase(Vs=400.0, density=2.1)}, {"left", "right"}),
+    ],
+)
+def test_a_column_is_identified_by_its_own_ground_and_wave(changed: dict[str, Any], hands: set[str]) -> None:
+    before, after = keys(), keys(**changed)
+    assert {hand for hand, key in before.items() if after[hand] != key} == hands
+
+
 def test_a_folder_without_sound_columns_is_refused(kept: sb.Run, tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"has no free_field\.h5"):
         sb.run(ground(), tmp_path / "out", columns=tmp_path)

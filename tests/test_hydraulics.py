@@ -141,12 +141,12 @@ def test_the_water_table_may_slope() -> None:
 
 def test_conductivity_tells_its_principal_axes() -> None:
     along = (np.cos(np.radians(30.0)), np.sin(np.radians(30.0)))
-    greatest, least, direction = Conductivity(1.0e-5, 1.0e-6, angle_deg=30.0).core
-    assert (greatest, least) == (1.0e-5, 1.0e-6)
-    assert direction == pytest.approx(along)
-    greatest, least, direction = Conductivity(1.0e-6, 1.0e-5, angle_deg=30.0).core
-    assert (greatest, least) == (1.0e-5, 1.0e-6)
-    assert direction == pytest.approx((-along[1], along[0]))
+    inclined = Conductivity(1.0e-5, 1.0e-6, angle_deg=30.0).core
+    assert (inclined.major, inclined.minor) == (1.0e-5, 1.0e-6)
+    assert inclined.direction == pytest.approx(along)
+    across = Conductivity(1.0e-6, 1.0e-5, angle_deg=30.0).core
+    assert (across.major, across.minor) == (1.0e-5, 1.0e-6)
+    assert across.direction == pytest.approx((-along[1], along[0]))
 
 
 # Seepage alone

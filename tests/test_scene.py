@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import runpy
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +24,13 @@ from sandboil import (
     Shaking,
     Water,
     WaterTable,
+    _core,
     box,
+    discretise,
     polygon,
 )
 from sandboil._errors import InvalidInput
+from sandboil.core.description import section_description
 from sandboil.motion import Motion
 from sandboil.scene.phases import REFERENCE_WATER_DENSITY
 from sandboil.scene.soils import Elastic, PM4Sand
@@ -332,21 +336,47 @@ def test_dry_densities() -> None:
 
 
 def test_elastic_pairs_are_equivalent() -> None:
-    by_nu = Elastic(E=2.6e4, nu=0.3)
-    assert by_nu.core() == {"kind": "elastic", "G": pytest.approx(1.0e4), "K": pytest.approx(2.6e4 / 1.2)}
-    assert Elastic(G=1.0e4, K=2.0e4).core() == {"kind": "elastic", "G": 1.0e4, "K": 2.0e4}
+    by_nu = Elastic(E=2.6e4, nu=0.3).core()
+    at_rest = (-50.0, -100.0, 0.0, -50.0)
+    assert _core.small_strain_moduli(by_nu, at_rest) == pytest.approx((1.0e4, 2.6e4 / 1.2))
+    assert Elastic(G=1.0e4, K=2.0e4).core() == _core.Soil.elastic(G=1.0e4, K=2.0e4)
 
 
 def test_sand_hands_its_parameters_on() -> None:
-    core = PM4Sand(relative_density=0.5, shear_modulus_coefficient=600, contraction_rate=0.4, z_max=2).core()
-    assert {name: value for name, value in core.items() if value is not None} == {
-        "kind": "pm4sand",
-        "Dr": 0.5,
-        "G0": 600.0,
-        "hpo": 0.4,
-        "z_max": 2.0,
-    }
-    assert core["nu"] is None
+    sand = PM4Sand(relative_density=0.5, shear_modulus_coefficient=600, contraction_rate=0.4, z_max=2)
+    assert sand.core() == _core.Soil.pm4sand(Dr=0.5, G0=600.0, hpo=0.4, z_max=2.0, nu=None)
+    assert sand.core() != _core.Soil.pm4sand(Dr=0.5, G0=600.0, hpo=0.4)
+
+
+def test_memory_of_gaps_is_an_option_of_the_sand() -> None:
+    def sent(numerics: Numerics) -> dict[str, bytes]:
+        scene = column(numerics=numerics)
+        return section_description(scene, discretise(scene)).parts()
+
+    without, with_memory = sent(Numerics()), sent(Numerics(gap_memory=True))
+    assert {name for name, part in without.items() if part != with_memory[name]} == {"regions"}
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: _core.Water(unit_weight=10.0, bulk_modulus=1e6, bulk_moduls=1e6),  # type: ignore[call-arg]
+        lambda: _core.Soil.elastic(G=1e4, K=2e4, nu=0.3),  # type: ignore[call-arg]
+        lambda: _core.Gravity(tolerance=1e-4),  # type: ignore[call-arg]
+        lambda: _core.Choices(printed_operator=True),  # type: ignore[call-arg]
+    ],
+)
+def test_the_core_refuses_unknown_and_missing_names(make: Callable[[], object]) -> None:
+    with pytest.raises(TypeError, match="argument"):
+        make()
+
+
+def test_descriptions_do_not_change() -> None:
+    layers = _core.Conductivity(major=1e-4, minor=1e-5, direction=(1.0, 0.0))
+    with pytest.raises(AttributeError):
+        layers.major = 1.0  # type: ignore[misc]
+    with pytest.raises(AttributeError):
+        layers.mayor = 1.0  # type: ignore[attr-defined]
 
 
 def test_water_level_and_stage_names() -> None:

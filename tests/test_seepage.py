@@ -101,12 +101,12 @@ def test_soils_and_tables_survive_a_file() -> None:
     layered = block(hydraulic_conductivity=sb.Conductivity(1e-4, 1e-5, angle_deg=20.0))
     scene = dam(regions=[layered], water_table=sb.WaterTable(points=[(0, 8), (10, 2)], above="retention"))
     assert sb.Scene.from_toml(scene.to_toml()) == scene
-    major, minor, (x, y) = layered.conductivity
-    assert (major, minor) == (1e-4, 1e-5)
-    assert (x, y) == pytest.approx((np.cos(np.radians(20.0)), np.sin(np.radians(20.0))))
+    conductivity = layered.conductivity
+    assert (conductivity.major, conductivity.minor) == (1e-4, 1e-5)
+    assert conductivity.direction == pytest.approx((np.cos(np.radians(20.0)), np.sin(np.radians(20.0))))
     upright = sb.Conductivity(1e-6, 1e-5).core
-    assert upright[:2] == (1e-5, 1e-6)
-    assert upright[2] == pytest.approx((0.0, 1.0))
+    assert (upright.major, upright.minor) == (1e-5, 1e-6)
+    assert upright.direction == pytest.approx((0.0, 1.0))
 
 
 def ground(**changes: Any) -> sb.Scene:

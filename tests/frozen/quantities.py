@@ -93,8 +93,8 @@ def of_stage(simulation: sb.Simulation) -> dict[str, Value]:
         )
         if (balance := simulation.water_balance) is not None:
             found |= _values("condition", {"inflow": balance[0], "stored": balance[1]})
-    for _, hand, _, record in simulation.take_columns():
-        found |= _values(f"{hand} column", {"impedance": record.impedance, "values": record.values})
+    for column, record in simulation.take_columns():
+        found |= _values(f"{column.hand} column", {"impedance": record.impedance, "values": record.values})
     return found
 
 

@@ -1,11 +1,16 @@
-//! Core errors as Python exceptions. The classes live in `sandboil._errors`; they are imported and filled
-//! here.
+//! Core errors as Python exceptions. The classes live in `sandboil._errors`; this module imports and
+//! raises them.
 
-use pyo3::{prelude::*, types::PyDict};
+use pyo3::{
+    exceptions::{PyRuntimeError, PyValueError},
+    prelude::*,
+    types::PyDict,
+};
+use sandboil_soil::SoilError;
 use sandboil_solver::{SolverError, StateError};
 use std::path::Path;
 
-/// A solver error, to be raised in Python.
+/// A solver error on its way to Python.
 pub struct CoreError(pub SolverError);
 
 impl From<CoreError> for PyErr {
@@ -44,7 +49,7 @@ fn exception(py: Python<'_>, error: SolverError) -> PyResult<PyErr> {
     Ok(PyErr::from_value(raised))
 }
 
-/// An error of the stored state in a file.
+/// What is wrong with the stored state in a file.
 pub fn state_error(py: Python<'_>, path: &Path, error: &StateError) -> PyResult<PyErr> {
     let classes = py.import("sandboil._errors")?;
     let raised = match error {
@@ -52,9 +57,24 @@ pub fn state_error(py: Python<'_>, path: &Path, error: &StateError) -> PyResult<
             classes.getattr("DamagedState")?.call1((format!("{} {error}", path.display()),))?
         }
         StateError::Version { .. } | StateError::Build | StateError::OtherModel => {
-            let hint = "run the scene anew, or go on with the sandboil and the scene that it is of";
+            let hint = "run the scene again, or continue with the sandboil and the scene that stored it";
             classes.getattr("InvalidInput")?.call1(("state", path, error.to_string(), hint))?
         }
     };
     Ok(PyErr::from_value(raised))
+}
+
+/// An error of a soil model without a node: a refused parameter with its name, or the message alone.
+pub fn refused(error: &SoilError) -> PyErr {
+    match *error {
+        SoilError::InvalidParameter { name, value, expected } => {
+            CoreError(SolverError::InvalidInput { name, value, expected }).into()
+        }
+        ref other => PyValueError::new_err(other.to_string()),
+    }
+}
+
+/// A description as bytes: equal descriptions have equal bytes.
+pub fn serialised(description: &impl serde::Serialize) -> PyResult<Vec<u8>> {
+    postcard::to_stdvec(description).map_err(|error| PyRuntimeError::new_err(error.to_string()))
 }

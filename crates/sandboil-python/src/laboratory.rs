@@ -1,8 +1,15 @@
-//! The laboratory's specimen: a material point under test, with a built-in model or one written in Python.
+//! The laboratory's specimen: a material point under test, of a model of ours or of one written in Python.
 
-use crate::material::{integrator, refused, soil};
+use crate::{
+    errors::refused,
+    soil::{Soil, integrator},
+};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, ToPyArray, ndarray::Array2};
-use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
+use pyo3::{
+    exceptions::PyValueError,
+    prelude::*,
+    types::{IntoPyDict, PyDict},
+};
 use sandboil_soil::{
     Integrator, Moduli, SoilError, SoilModel, StrainIncrement, Stress, UpdateReport,
     laboratory::{self as lab, Ending, Path, Point, Record, Resolution, Shear, Turn, Turns},
@@ -10,7 +17,7 @@ use sandboil_soil::{
 };
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// An exception that a Python model raised when the core called it.
+/// An exception that a Python model raised while the core was driving it.
 type Raised = Arc<Mutex<Option<PyErr>>>;
 
 /// A model written in Python: an object with `initialise`, `update`, `stress` and `moduli` (`sandboil.lab`).
@@ -18,7 +25,7 @@ struct PythonPoint {
     model: Py<PyAny>,
     state: Py<PyAny>,
     marked: Py<PyAny>,
-    /// Stress and moduli of the state and of the marked state.
+    /// Stress and moduli of the state, and of the marked one.
     read: (Stress, Moduli),
     marked_read: (Stress, Moduli),
     raised: Raised,
@@ -137,7 +144,7 @@ fn turn((kind, value): (String, f64)) -> PyResult<Turn> {
 
 #[pymethods]
 impl Specimen {
-    /// `material` is the dictionary of a built-in model or an object with the methods of a Python model.
+    /// `material` is a soil of the core or an object with the methods of a Python model.
     #[new]
     #[pyo3(signature = (material, stress, void_ratio, *, scheme, tolerance=None, max_increment=None))]
     fn new(
@@ -150,9 +157,8 @@ impl Specimen {
     ) -> PyResult<Self> {
         let integrator = integrator(scheme, tolerance, max_increment)?;
         let raised = Raised::default();
-        let inner = if let Ok(dict) = material.cast::<PyDict>() {
-            let soil = soil(dict, false)?;
-            let specimen = with_model!(&soil, model => {
+        let inner = if let Ok(soil) = material.cast::<Soil>() {
+            let specimen = with_model!(&soil.get().0, model => {
                 lab::Specimen::new(model, stress_of(stress), void_ratio, integrator)
             });
             specimen.map_err(|error| refused(&error))?
@@ -163,8 +169,8 @@ impl Specimen {
         Ok(Self { inner, raised })
     }
 
-    /// Direct simple shear between turns, each `("stress", kPa)` or `("strain", engineering)`; with `count`
-    /// the first two alternate. Returns the record and the reason for its end.
+    /// Direct simple shear from turn to turn, each `("stress", kPa)` or `("strain", engineering)`; with `count` the
+    /// first two alternate. Returns the record and how it ended.
     #[pyo3(signature = (turns, *, drained, count=None, strain_step, strain_limit, stress_resolution, strain_resolution))]
     #[expect(clippy::too_many_arguments, reason = "keywords of the Python call")]
     fn shear<'py>(
@@ -189,8 +195,8 @@ impl Specimen {
         self.run(py, record, move |specimen, record, stop| specimen.shear(&test, record, stop))
     }
 
-    /// Loads the specimen by rows of `(xx, yy, xy)`. A component is a stress (kPa) where `by_stress` is true,
-    /// else a total strain. Returns the record and the reason for its end.
+    /// Leads the specimen through rows of `(xx, yy, xy)`, each component a stress (kPa) where `by_stress` says so,
+    /// else a total strain. Returns the record and how it ended.
     #[pyo3(signature = (rows, *, by_stress, strain_step, stress_resolution, strain_resolution))]
     fn path<'py>(
         &mut self,
@@ -207,12 +213,12 @@ impl Specimen {
         self.run(py, record, move |specimen, record, stop| specimen.path(&path, record, stop))
     }
 
-    /// A copy of the specimen in the same state.
+    /// Another specimen in the same state, to go on with while this one stays.
     fn copy(&self) -> Self {
         Self { inner: self.inner.copy(), raised: self.raised.clone() }
     }
 
-    /// Switches to reconsolidation after shaking; returns whether the model has such a mode.
+    /// Switches to reconsolidation after shaking; returns whether the model makes a difference.
     fn reconsolidate(&mut self) -> bool {
         self.inner.reconsolidate()
     }
@@ -246,13 +252,9 @@ impl Specimen {
         self.inner.point().plastic_shear_strain()
     }
 
-    /// Counts of the model's work by kind, rejected trials included.
+    /// Work done by the model, by kind, trials that were given up included.
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        for (name, value) in self.inner.report().named() {
-            dict.set_item(name, value)?;
-        }
-        Ok(dict)
+        self.inner.report().named().into_py_dict(py)
     }
 }
 
@@ -277,7 +279,7 @@ impl Specimen {
             return Err(signal);
         }
         if let Some(raised) = self.raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            // A failed trial that a smaller one replaced is not a failure of the test.
+            // A trial that failed and was mended by a smaller one is no failure of the test.
             if matches!(ending, Ending::Refused(SoilError::Outside(_))) {
                 return Err(raised);
             }
@@ -305,7 +307,7 @@ pub fn columns<'py>(py: Python<'py>, record: &Record) -> PyResult<Bound<'py, PyD
     Ok(dict)
 }
 
-/// Why a test ended: `complete`, `strain limit`, or another reason as text.
+/// How a test ended: `complete`, `strain limit`, or a reason in words.
 fn told(ending: &Ending) -> String {
     match ending {
         Ending::Complete => "complete".into(),
@@ -320,27 +322,36 @@ fn told(ending: &Ending) -> String {
     }
 }
 
-/// Whether a material can carry an effective stress `(xx, yy, xy, zz)`, kPa, tension positive, unchanged.
+/// Shear and bulk modulus, kPa, of a soil at rest under the effective stress `(xx, yy, xy, zz)`, kPa, tension
+/// positive.
 #[pyfunction]
-pub fn carries(material: &Bound<'_, PyDict>, stress: [f64; 4]) -> PyResult<bool> {
-    let soil = soil(material, false)?;
-    Ok(with_model!(&soil, model => model.carries(&stress_of(stress))))
+pub fn small_strain_moduli(soil: &Soil, stress: [f64; 4]) -> PyResult<(f64, f64)> {
+    let moduli = soil.0.small_strain_moduli(stress_of(stress)).map_err(|error| refused(&error))?;
+    Ok((moduli.shear, moduli.bulk))
 }
 
-/// Every constant of a PM4Sand material at an initial effective stress `(xx, yy, xy, zz)`, kPa, tension
-/// positive: defaults included, and the constants that follow from the stress.
+/// Whether a soil can carry an effective stress `(xx, yy, xy, zz)`, kPa, tension positive, without a change.
+#[pyfunction]
+pub fn carries(soil: &Soil, stress: [f64; 4]) -> bool {
+    with_model!(&soil.0, model => model.carries(&stress_of(stress)))
+}
+
+/// Every constant of PM4Sand at an initial effective stress `(xx, yy, xy, zz)`, kPa, tension positive: defaults filled
+/// in, and what follows from the stress.
 #[pyfunction]
 pub fn pm4sand_constants<'py>(
-    material: &Bound<'py, PyDict>,
+    py: Python<'py>,
+    soil: &Soil,
     stress: [f64; 4],
 ) -> PyResult<Bound<'py, PyDict>> {
-    let sand = crate::material::pm4sand(material, false)?;
+    let sandboil_soil::Soil::PM4Sand(sand) = &soil.0 else {
+        return Err(PyValueError::new_err("soil: must be PM4Sand"));
+    };
     let state = sand.initialise(stress_of(stress), None).map_err(|error| refused(&error))?;
     let c = sand.parameters();
     let moduli = sand.moduli(&state);
     let surfaces = sand.surfaces_of(&state);
-    let dict = PyDict::new(material.py());
-    for (name, value) in [
+    [
         ("Dr", c.dr),
         ("G0", c.g0),
         ("hpo", c.hpo),
@@ -370,8 +381,6 @@ pub fn pm4sand_constants<'py>(
         ("e", c.initial_void_ratio()),
         ("G", moduli.shear),
         ("K", moduli.bulk),
-    ] {
-        dict.set_item(name, value)?;
-    }
-    Ok(dict)
+    ]
+    .into_py_dict(py)
 }

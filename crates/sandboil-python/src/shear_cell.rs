@@ -1,16 +1,21 @@
 //! The shear cell as a Python class.
 
 use crate::{
+    arrays::{pages, rows},
     errors::CoreError,
     laboratory::columns,
-    material::soil,
-    simulation::{counted, get, numerics, pages, rows},
+    section::Numerics,
+    simulation::counted,
+    soil::Soil,
+    stepping::repeat,
 };
 use numpy::{PyArray1, PyArray2, PyArray3, ToPyArray};
-use pyo3::{prelude::*, types::PyDict};
+use pyo3::{
+    prelude::*,
+    types::{IntoPyDict, PyDict},
+};
 use sandboil_soil::laboratory::Resolution;
 use sandboil_solver as solver;
-use std::time::{Duration, Instant};
 
 /// Steps between readings of the clock.
 const STEPS_PER_LOOK: usize = 32;
@@ -24,30 +29,68 @@ pub struct ShearCell {
 #[pymethods]
 impl ShearCell {
     #[new]
-    fn new(test: &Bound<'_, PyDict>, threads: usize) -> PyResult<Self> {
-        let numerics_dict: Bound<'_, PyDict> = get(test, "numerics")?;
-        let gap_memory = get(&numerics_dict, "gap_memory")?;
+    #[pyo3(signature = (
+        *,
+        soil,
+        void_ratio,
+        density,
+        vertical_stress,
+        earth_pressure_coefficient,
+        stress_ratio,
+        size,
+        free_size,
+        spacing,
+        strain_step,
+        inertia,
+        local_damping,
+        strain_limit,
+        turn_limit,
+        stress_resolution,
+        strain_resolution,
+        every_stress_node,
+        numerics,
+        threads,
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
+    fn new(
+        soil: Soil,
+        void_ratio: Option<f64>,
+        density: f64,
+        vertical_stress: f64,
+        earth_pressure_coefficient: f64,
+        stress_ratio: f64,
+        size: f64,
+        free_size: f64,
+        spacing: f64,
+        strain_step: f64,
+        inertia: f64,
+        local_damping: f64,
+        strain_limit: f64,
+        turn_limit: usize,
+        stress_resolution: f64,
+        strain_resolution: f64,
+        every_stress_node: bool,
+        numerics: &Numerics,
+        threads: usize,
+    ) -> PyResult<Self> {
         let test = solver::CellTest {
-            soil: soil(&get::<Bound<'_, PyDict>>(test, "material")?, gap_memory)?,
-            void_ratio: get(test, "void_ratio")?,
-            density: get(test, "density")?,
-            vertical_stress: get(test, "sigma_v0")?,
-            earth_pressure_coefficient: get(test, "K0")?,
-            stress_ratio: get(test, "csr")?,
-            size: get(test, "size")?,
-            free_size: get(test, "free_size")?,
-            spacing: get(test, "spacing")?,
-            strain_step: get(test, "strain_step")?,
-            inertia: get(test, "inertia")?,
-            local_damping: get(test, "local_damping")?,
-            strain_limit: get(test, "gamma_stop")?,
-            turn_limit: get(test, "turns")?,
-            resolution: Resolution {
-                stress: get(test, "stress_resolution")?,
-                strain: get(test, "strain_resolution")?,
-            },
-            every_stress_node: get(test, "every_stress_node")?,
-            numerics: numerics(&numerics_dict)?,
+            soil: soil.0,
+            void_ratio,
+            density,
+            vertical_stress,
+            earth_pressure_coefficient,
+            stress_ratio,
+            size,
+            free_size,
+            spacing,
+            strain_step,
+            inertia,
+            local_damping,
+            strain_limit,
+            turn_limit,
+            resolution: Resolution { stress: stress_resolution, strain: strain_resolution },
+            every_stress_node,
+            numerics: numerics.0,
         };
         Ok(Self { inner: solver::ShearCell::new(test, threads).map_err(CoreError)? })
     }
@@ -55,20 +98,12 @@ impl ShearCell {
     /// Makes steps until `seconds` have passed or the test is over; returns whether it is over.
     fn advance(&mut self, py: Python<'_>, seconds: f64) -> PyResult<bool> {
         let inner = &mut self.inner;
-        let outcome = py.detach(|| -> Result<bool, solver::SolverError> {
-            let budget = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
-            let start = Instant::now();
-            loop {
-                if inner.advance(STEPS_PER_LOOK)? {
-                    return Ok(true);
-                }
-                if start.elapsed() >= budget {
-                    return Ok(false);
-                }
-            }
-        });
-        py.check_signals()?;
-        Ok(outcome.map_err(CoreError)?)
+        let mut is_over = false;
+        repeat(py, seconds, || {
+            is_over = inner.advance(STEPS_PER_LOOK)?;
+            Ok(is_over)
+        })?;
+        Ok(is_over)
     }
 
     /// Means over the centre, with the columns of a specimen's record.
@@ -79,18 +114,15 @@ impl ShearCell {
     /// The largest departures from homogeneous shear, by name.
     fn departure<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let largest = self.inner.largest_departure();
-        let dict = PyDict::new(py);
-        for (name, value) in [
+        [
             ("gamma_spread", largest.gamma_spread),
             ("tau_spread", largest.tau_spread),
             ("sigma_v_spread", largest.vertical_spread),
             ("volume_strain", largest.volume_strain),
             ("velocity_deviation", largest.velocity_deviation / largest.edge_speed),
             ("overshoot", largest.overshoot),
-        ] {
-            dict.set_item(name, value)?;
-        }
-        Ok(dict)
+        ]
+        .into_py_dict(py)
     }
 
     /// Cycles made, and present shear strain.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,13 +10,18 @@ from .. import _core
 from .._types import Floats
 from ..ground.discretise import Discretisation
 from ..scene.conditions import AnyCondition
+from ..scene.edges import CompliantBase
 from ..scene.region import Region
-from ..scene.stages import AnyStage, RunOut, Shaking
-from .motions import StageMotions, Wave
+from ..scene.soils import Material, PM4Sand
+from ..scene.stages import AnyStage, Gravity, RunOut, Shaking
+from .motions import StageMotions
 from .probes import Probe
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
+
+# A stage of grains.
+GrainStage = _core.Gravity | _core.Shaking | _core.RunOut
 
 
 def stress_node_positions(particles: Discretisation) -> Floats:
@@ -26,147 +31,182 @@ def stress_node_positions(particles: Discretisation) -> Floats:
     return places
 
 
-def section_description(scene: Scene, particles: Discretisation) -> dict[str, Any]:
+def section_description(scene: Scene, particles: Discretisation) -> _core.Section:
     """The section at rest: nodes, soils, water, edges and numerics."""
     x0, x1, _, _ = particles.bounds
     sigma_v_eff, _ = particles.stress_at(stress_node_positions(particles).reshape(-1, 2))
     water = scene.water
-    numerics = scene.numerics.model_dump(exclude={"local_damping", "time_step_factor"})
-    numerics["velocity_filter"] = scene.numerics.filter_strength
-    return {
-        "spacing": particles.spacing,
-        "position": particles.position,
-        "volume": particles.volume,
-        "region": particles.region.astype(np.uint32),
-        "regions": [_region(scene, region) for region in scene.regions],
-        "surface_elevation": particles.surface_elevation,
-        "vertical_effective_stress": sigma_v_eff,
-        "pore_pressure": np.empty(0) if water is None else particles.pore_pressure0,
-        "saturation": np.empty(0) if particles.saturation0 is None else particles.saturation0,
-        "water": None if water is None else (water.unit_weight, water.bulk_modulus),
-        "gravity": scene.gravity,
-        "period": x1 - x0 if scene.is_periodic else None,
-        **_edges(scene),
-        "numerics": numerics,
-    }
-
-
-def _edges(scene: Scene) -> dict[str, Any]:
-    """Base and sides as the numerical core takes them, and what they are in statics."""
-    outline, (x0, _, x1, _) = scene.outline, scene.bounds
-    left, right = (
-        _side(kind, x, extent)
-        for kind, x, extent in zip(scene.side_kinds, (x0, x1), (outline.left, outline.right), strict=True)
+    return _core.Section(
+        spacing=particles.spacing,
+        position=particles.position,
+        volume=particles.volume,
+        region=particles.region.astype(np.uint32),
+        regions=[_region(scene, region) for region in scene.regions],
+        surface_elevation=particles.surface_elevation,
+        vertical_effective_stress=sigma_v_eff,
+        pore_pressure=np.empty(0) if water is None else particles.pore_pressure0,
+        saturation=np.empty(0) if particles.saturation0 is None else particles.saturation0,
+        water=None
+        if water is None
+        else _core.Water(unit_weight=water.unit_weight, bulk_modulus=water.bulk_modulus),
+        gravity=scene.gravity,
+        period=x1 - x0 if scene.is_periodic else None,
+        outline=outline_description(scene),
+        numerics=_numerics(scene),
     )
-    return {
-        "base": outline.base,
-        "base_support": scene.statics.base,
-        "left": left,
-        "right": right,
-    }
 
 
-def _side(kind: str, x: float, extent: tuple[float, float]) -> dict[str, Any] | None:
-    """A side as a wall of the static stage; None between periodic sides."""
+def outline_description(scene: Scene) -> _core.Outline:
+    """Base and sides with their supports in statics."""
+    outline, (x0, _, x1, _) = scene.outline, scene.bounds
+    left, right = scene.side_kinds
+    return _core.Outline(
+        base=outline.base,
+        base_support=scene.statics.base,
+        left=_side(left, x0, outline.left),
+        right=_side(right, x1, outline.right),
+    )
+
+
+def _side(kind: str, x: float, extent: tuple[float, float]) -> _core.Side | None:
+    """A side with its support in statics; None between periodic sides."""
     if kind == "periodic":
         return None
-    support = "fixed" if kind == "fixed" else "roller"
-    return {"x": x, "bottom": extent[0], "top": extent[1], "support": support}
+    bottom, top = extent
+    return _core.Side(x=x, bottom=bottom, top=top, support="no-slip" if kind == "fixed" else "free-slip")
+
+
+def _numerics(scene: Scene) -> _core.Numerics:
+    numerics = scene.numerics
+    return _core.Numerics(
+        operators=numerics.operators,
+        smoothing_ratio=numerics.smoothing_ratio,
+        velocity_filter=numerics.filter_strength,
+        diffusion=numerics.diffusion,
+        acceleration_term=numerics.acceleration_term,
+        dispersion_correction=numerics.dispersion_correction,
+        geometry_strain_limit=numerics.geometry_strain_limit,
+        integrator=numerics.integrator,
+        integrator_tolerance=numerics.integrator_tolerance,
+    )
+
+
+def _region(scene: Scene, region: Region) -> _core.Region:
+    phases = region.resolved(scene)
+    poisson = scene.statics.initial_poisson_ratio
+    return _core.Region(
+        soil=_soil(scene, region.material),
+        porosity=phases.porosity,
+        solid_density=phases.solid_density,
+        hydraulic_conductivity=region.conductivity,
+        retention=region.retention.core if region.retention and scene.holds_suction else None,
+        earth_pressure_coefficient=region.K0,
+        static_poisson_ratio=region.initial_poisson_ratio if poisson is None else poisson,
+    )
+
+
+def _soil(scene: Scene, material: Material) -> _core.Soil:
+    """A soil. `gap_memory`, an option of PM4Sand, is given once for the scene, in its numerics."""
+    if isinstance(material, PM4Sand):
+        return material.core(gap_memory=scene.numerics.gap_memory)
+    return material.core()
 
 
 def stage_description(
     scene: Scene, stage: AnyStage, duration: float | None, motions: StageMotions | None, probes: list[Probe]
-) -> dict[str, Any] | None:
-    """A stage in which the ground moves; None for another.
+) -> GrainStage | None:
+    """A stage of grains; None for seepage, which has none.
 
     `duration` (s) and `motions` are those of the stage, `probes` the places of its histories.
     """
     match stage:
+        case Gravity():
+            return _core.Gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
         case Shaking():
             assert motions is not None
-            own = _shaking(scene, stage, *motions.waves())
+            assert duration is not None
+            return _shaking(scene, stage, duration, motions, _output(scene, probes))
         case RunOut():
-            own = _run_out(scene, stage)
+            return _run_out(scene, stage, _output(scene, probes))
         case _:
             return None
+
+
+def _output(scene: Scene, probes: list[Probe]) -> _core.Output:
     output = scene.output
-    return {
-        "duration": duration,
-        **own,
-        "column_records": (None, None),
-        "record_columns": None,
-        "local_damping": scene.numerics.local_damping,
-        "time_step_factor": scene.numerics.time_step_factor,
-        "probes": np.array([(probe.x, probe.y) for probe in probes]),
-        "history_interval": output.history_dt,
-        "stress_histories": output.stress_paths,
-        "pressure_envelope": "r_u" in output.envelopes,
-        "strain_envelope": "gamma_max" in output.envelopes,
-    }
+    return _core.Output(
+        probes=np.array([(probe.x, probe.y) for probe in probes]),
+        history_interval=output.history_dt,
+        stress_histories=output.stress_paths,
+        pressure_envelope="r_u" in output.envelopes,
+        strain_envelope="gamma_max" in output.envelopes,
+    )
 
 
-def _run_out(scene: Scene, stage: RunOut) -> dict[str, Any]:
-    """The walls and the water of a run-out. No wave arrives: the base only has a place."""
-    x0, _, x1, _ = scene.bounds
-    return {
-        "waves": [],
-        "base": {"vertical": "roller", "half_space": None, "segments": [(x0, x1, None, 0.0, 0.0)]},
-        "sides": ("wall", "wall"),
-        "conditions": [],
-        "rayleigh": None,
-        "run_out": {
-            "viscosity": stage.viscosity,
-            "open": tuple(hand in stage.open_sides for hand in ("left", "right")),
-            "still_water": None
-            if stage.still_water is None
-            else np.array(stage.still_water, dtype=np.float64).reshape(-1, 2),
-        },
-    }
+def _run_out(scene: Scene, stage: RunOut, output: _core.Output) -> _core.RunOut:
+    line = stage.still_water
+    return _core.RunOut(
+        duration=stage.duration,
+        viscosity=stage.viscosity,
+        open=("left" in stage.open_sides, "right" in stage.open_sides),
+        still_water=None if line is None else np.array(line, dtype=np.float64).reshape(-1, 2),
+        local_damping=scene.numerics.local_damping,
+        time_step_factor=scene.numerics.time_step_factor,
+        output=output,
+    )
 
 
-def _shaking(scene: Scene, stage: Shaking, waves: list[Wave], wave_of: list[int | None]) -> dict[str, Any]:
-    """The waves that shake the ground, and its edges; `wave_of` is the wave of each stretch of the base."""
-    base, rayleigh = stage.base, stage.rayleigh
-    left, right = ("free-field" if kind == "free-field" else "wall" for kind in scene.side_kinds)
-    return {
-        "waves": waves,
-        "base": {
-            "vertical": stage.base_vertical,
-            "half_space": None if base.Vs is None else (base.Vs, base.Vp, base.density),
-            "segments": [
-                (*arrival.x, wave, arrival.delay, arrival.slowness)
-                for arrival, wave in zip(scene.arrivals(stage), wave_of, strict=True)
-            ],
-        },
-        "sides": (left, right),
-        "conditions": [
-            condition_description(scene, condition) | {"at_rest": at_rest}
+def _shaking(
+    scene: Scene, stage: Shaking, duration: float, motions: StageMotions, output: _core.Output
+) -> _core.Shaking:
+    left, right = (kind == "free-field" for kind in scene.side_kinds)
+    rayleigh = stage.rayleigh
+    return _core.Shaking(
+        duration=duration,
+        base=base_description(scene, stage, motions),
+        free_field=(left, right),
+        local_damping=scene.numerics.local_damping,
+        rayleigh=None
+        if rayleigh is None
+        else _core.Rayleigh(ratio=rayleigh.ratio, frequencies=rayleigh.frequencies),
+        conditions=[]
+        if scene.water is None
+        else [
+            _core.MovingCondition(condition=condition_description(scene, condition), at_rest=at_rest)
             for condition, at_rest in scene.moving_conditions(stage)
-        ]
-        if scene.water is not None
-        else [],
-        "rayleigh": None if rayleigh is None else (rayleigh.ratio, rayleigh.frequencies),
-        "run_out": None,
-    }
+        ],
+        time_step_factor=scene.numerics.time_step_factor,
+        output=output,
+    )
 
 
-def condition_description(scene: Scene, condition: AnyCondition) -> dict[str, Any]:
-    """A hydraulic condition as the numerical core takes it."""
-    line = np.array(scene.condition_line(condition).coords)
-    series = condition.series
-    time, value = zip(*series, strict=True) if series else ((), ())
-    return {"kind": condition.kind, "line": line, "series": (list(time), list(value))}
+def base_description(scene: Scene, stage: Shaking, motions: StageMotions) -> _core.Base:
+    """The base of a shaking stage, and the waves that arrive through it."""
+    base = stage.base
+    waves, wave_of = motions.waves()
+    return _core.Base(
+        vertical=stage.base_vertical,
+        half_space=_half_space(base),
+        waves=waves,
+        segments=[
+            _core.BaseSegment(extent=arrival.x, wave=wave, delay=arrival.delay, slowness=arrival.slowness)
+            for arrival, wave in zip(scene.arrivals(stage), wave_of, strict=True)
+        ],
+    )
 
 
-def _region(scene: Scene, region: Region) -> dict[str, Any]:
-    soil = region.resolved(scene)
-    poisson = scene.statics.initial_poisson_ratio
-    return {
-        "material": region.material.core(),
-        "porosity": soil.porosity,
-        "solid_density": soil.solid_density,
-        "hydraulic_conductivity": region.conductivity,
-        "retention": region.retention.core if region.retention and scene.holds_suction else None,
-        "earth_pressure_coefficient": region.K0,
-        "static_poisson_ratio": region.initial_poisson_ratio if poisson is None else poisson,
-    }
+def _half_space(base: CompliantBase) -> _core.HalfSpace | None:
+    """The half-space of a base that is given by its own properties; None: that of the soil above."""
+    if base.Vs is None or base.density is None:
+        return None
+    return _core.HalfSpace(shear_speed=base.Vs, compression_speed=base.Vp, density=base.density)
+
+
+def condition_description(scene: Scene, condition: AnyCondition) -> _core.Condition:
+    """A hydraulic condition on its line."""
+    return _core.Condition(
+        kind=condition.kind,
+        line=np.array(scene.condition_line(condition).coords),
+        time=[time for time, _ in condition.series],
+        value=[value for _, value in condition.series],
+    )

@@ -8,16 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .. import _core
 from .._errors import InvalidInput
-from .._types import Floats
 from ..motion import Motion
 from ..scene.stages import Shaking
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
-
-# Spacing of a wave's samples, s, and its horizontal and vertical velocities, m/s.
-Wave = tuple[float, Floats, Floats | None]
 
 
 @dataclass(frozen=True)
@@ -37,16 +34,21 @@ class StageMotions:
     vertical: Motion | None
     segments: list[Motion | None]
 
-    def waves(self) -> tuple[list[Wave], list[int | None]]:
-        """The upgoing waves, and the index of that of each stretch; None where nothing comes."""
-        waves: list[Wave] = []
+    def waves(self) -> tuple[list[_core.Wave], list[int | None]]:
+        """The upgoing waves, and for each stretch the index of its wave; None where no wave arrives."""
+        waves: list[_core.Wave] = []
         upgoing = [
             None if motion is None else motion.upgoing_velocity() for motion in (self.main, self.vertical)
         ]
         horizontal, vertical = (None if wave is None else np.ascontiguousarray(wave[1]) for wave in upgoing)
         dt = next((wave[0] for wave in upgoing if wave is not None), None)
         if dt is not None:
-            waves.append((dt, np.zeros(1) if horizontal is None else horizontal, vertical))
+            still = np.zeros(1)
+            waves.append(
+                _core.Wave(
+                    interval=dt, horizontal=still if horizontal is None else horizontal, vertical=vertical
+                )
+            )
         of_stage = len(waves) - 1 if waves else None
         indices: list[int | None] = []
         for motion in self.segments:
@@ -55,7 +57,9 @@ class StageMotions:
             else:
                 own, velocity = motion.upgoing_velocity()
                 indices.append(len(waves))
-                waves.append((own, np.ascontiguousarray(velocity), None))
+                waves.append(
+                    _core.Wave(interval=own, horizontal=np.ascontiguousarray(velocity), vertical=None)
+                )
         return waves, indices
 
 

@@ -6,7 +6,7 @@ import math
 import os
 import warnings
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from .._errors import InvalidInput, SandboilError, SandboilWarning, SuctionWarni
 from .._types import Floats
 from ..files.fingerprint import fingerprint
 from ..ground.discretise import discretise
-from ..run.columns import HANDS, ColumnRecord
-from ..run.columns import prepare as prepare_columns
+from ..run.columns import HANDS, Column, columns_of, with_columns
 from ..scene.stages import AnyStage, Gravity, Seepage
 from .description import condition_description, section_description, stage_description
 from .doubts import doubts
@@ -115,13 +114,12 @@ class Simulation:
         ]
         self._water: _core.Seepage | None = None
         self._grains: _core.Simulation | None = None
-        self._columns: list[tuple[str, str, str]] = []
+        self._columns: list[Column] = []
         if scene.seepage is None:
-            stages = dict(zip(scene.stage_names, self._stages, strict=True))
             if columns is not None or keep_columns:
-                self._columns = prepare_columns(
-                    self._section, stages, scene.statics.tolerance, columns, keep_columns
-                )
+                stages = dict(zip(scene.stage_names, self._stages, strict=True))
+                self._columns = columns_of(self._section, stages, columns, keep_columns)
+                self._stages = with_columns(stages, self._columns, columns, keep_columns)
             self._grains = _core.Simulation(self._section, threads)
         self._index = -1
         self._begin_next_stage()
@@ -280,16 +278,16 @@ class Simulation:
     def fingerprints(self) -> dict[str, str]:
         """Fingerprints that identify the scene: of each part of the section, each stage and the output."""
         stages = (
-            stage.model_dump() if described is None else described
+            stage.model_dump_json().encode() if described is None else bytes(described)
             for stage, described in zip(self.scene.stages, self._stages, strict=True)
         )
         return {
-            **{name: fingerprint(described) for name, described in self._section.items()},
+            **{name: fingerprint(part) for name, part in self._section.parts().items()},
             **{
-                STAGE_PREFIX + name: fingerprint(described)
-                for name, described in zip(self.scene.stage_names, stages, strict=True)
+                STAGE_PREFIX + name: fingerprint(stage)
+                for name, stage in zip(self.scene.stage_names, stages, strict=True)
             },
-            OUTPUT: fingerprint(self.scene.output.model_dump()),
+            OUTPUT: fingerprint(self.scene.output.model_dump_json().encode()),
         }
 
     def begin_next_stage(self) -> None:
@@ -309,17 +307,14 @@ class Simulation:
         stage, description = self.present_stage, self._stages[self._index]
         if isinstance(stage, Seepage):
             conditions = [condition_description(self.scene, condition) for condition in stage.conditions]
-            pressure = self.particles.pore_pressure0
-            self._water = _core.Seepage(self._section, pressure, conditions, stage.duration)
+            self._water = _core.Seepage(self._section, conditions=conditions, duration=stage.duration)
             return
         if self._grains is None:
             self._grains = _core.Simulation(self._with_water_of_seepage(), self.threads)
-        if isinstance(stage, Gravity):
-            self._grains.begin_gravity(tolerance=stage.tolerance, max_steps=stage.max_steps)
-        elif description is not None:
-            self._grains.begin_shaking(description)
+        assert description is not None
+        self._grains.begin(description)
 
-    def _with_water_of_seepage(self) -> dict[str, Any]:
+    def _with_water_of_seepage(self) -> _core.Section:
         """The section at rest with the water at the end of its seepage stage."""
         assert self._water is not None
         pressure, saturation = self._water.pore_pressure(), self._water.saturation()
@@ -340,15 +335,15 @@ class Simulation:
             raise SandboilError(f"{self.stage!r} is computed without the grains")
         return self._grains
 
-    def take_columns(self) -> list[tuple[str, str, str, ColumnRecord]]:
-        """Stage, side, fingerprint and record of the present stage's columns, if they are kept; once."""
+    def take_columns(self) -> list[tuple[Column, _core.ColumnRecord]]:
+        """The columns of the present stage and what they did, if they are kept; once."""
         if self._grains is None:
             return []
         records = dict(zip(HANDS, self._grains.take_column_records(), strict=True))
         return [
-            (stage, hand, fingerprint, ColumnRecord.of_core(record))
-            for stage, hand, fingerprint in self._columns
-            if stage == self.stage and (record := records[hand]) is not None
+            (column, record)
+            for column in self._columns
+            if column.stage == self.stage and (record := records[column.hand]) is not None
         ]
 
     # Reading

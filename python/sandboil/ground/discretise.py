@@ -9,7 +9,6 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from .. import _core
 from .._errors import InvalidInput
 from .._types import COORDINATE_TOLERANCE, Floats
 from .overburden import Overburden, PoreWater
@@ -181,7 +180,5 @@ def _water_at_rest(scene: Scene, particles: Discretisation) -> tuple[Floats, Flo
         if not scene.holds_suction:
             pressure[above] = saturation[above] = 0.0
         elif region.retention is not None:
-            saturation[above] = _core.saturation(
-                region.retention.core, pressure[above] / scene.water.unit_weight
-            )
+            saturation[above] = region.retention.core.saturation(pressure[above] / scene.water.unit_weight)
     return pressure, saturation

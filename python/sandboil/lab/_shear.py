@@ -264,7 +264,7 @@ def _largest_shear_ratio(sand: PM4Sand, specimen: _core.Specimen, drained: bool)
     assert void_ratio is not None
     e_max, e_min = sand.void_ratio_limits
     density = (e_max - void_ratio) / (e_max - e_min)
-    constants = _core.pm4sand_constants(sand.core() | {"Dr": density}, specimen.stress)
+    constants = _core.pm4sand_constants(sand.changed(Dr=density).core(), specimen.stress)
     sine = 0.5 * constants["Mb"]
     frictional = math.tan(math.asin(sine)) if sine < 1.0 else math.inf
     if drained:

@@ -317,8 +317,8 @@ def _run_stage(
         raise
     writer.write(spent(), frame=is_timed or is_last)
     writer.end_stage()
-    for stage, hand, fingerprint, record in simulation.take_columns():
-        save_column(writer.path.parent, stage, hand, fingerprint, record)
+    for column, record in simulation.take_columns():
+        save_column(writer.path.parent, column, record)
     keeper.store(writer.mark(), target, spent(), is_end=True)
 
 

@@ -8,6 +8,7 @@ from pydantic import Field
 from pydantic.config import JsonDict
 from shapely.geometry.base import BaseGeometry
 
+from .. import _core
 from .._model import Model
 from .._types import Number, Positive
 from .phases import SoilPhases, phases_of
@@ -101,10 +102,12 @@ class Region(Model):
         return self.shape.geometry
 
     @property
-    def conductivity(self) -> tuple[float, float, tuple[float, float]]:
-        """Largest and smallest hydraulic conductivity, m/s, and the direction of the largest."""
+    def conductivity(self) -> _core.Conductivity:
+        """Hydraulic conductivity by its principal values, m/s; zero in undrained soil."""
         given = self.hydraulic_conductivity or 0.0
-        return given.core if isinstance(given, Conductivity) else (given, given, (1.0, 0.0))
+        if isinstance(given, Conductivity):
+            return given.core
+        return _core.Conductivity(major=given, minor=given, direction=(1.0, 0.0))
 
     @property
     def initial_poisson_ratio(self) -> float:

@@ -203,7 +203,7 @@ class Scene(Model):
     @property
     def uses_acceleration_term(self) -> bool:
         """Whether the pore water's acceleration enters the flow (numerics.acceleration_term resolved)."""
-        largest = max(region.conductivity[0] for region in self.regions)
+        largest = max(region.conductivity.major for region in self.regions)
         choice = self.numerics.acceleration_term
         if self.water is None or largest == 0.0 or choice == "off":
             return False

@@ -189,9 +189,12 @@ class PM4Sand(Model):
         e_max, e_min = self.void_ratio_limits
         return e_max - (e_max - e_min) * self.Dr
 
-    def core(self) -> dict[str, float | str | None]:
-        """Kind and parameters as the numerical core takes them; None asks for the model's default."""
-        return self.model_dump()
+    def core(self, *, gap_memory: bool = False) -> _core.Soil:
+        """The sand for the numerical core.
+
+        With `gap_memory` expansion at the pressure floor must be recovered before stress can increase again.
+        """
+        return _core.Soil.pm4sand(**self.model_dump(exclude={"kind"}), gap_memory=gap_memory)
 
 
 class _Skeleton(Model):
@@ -235,10 +238,6 @@ class _Skeleton(Model):
         assert self.K is not None
         return self.K
 
-    def core(self) -> dict[str, float | str | None]:
-        """Kind, moduli and parameters as the numerical core takes them."""
-        return self.model_dump(exclude={"E", "nu"}) | {"G": self.shear_modulus, "K": self.bulk_modulus}
-
 
 class Elastic(_Skeleton):
     """Linear isotropic elasticity by G and K, or by E and nu (drained). Moduli in kPa.
@@ -261,6 +260,10 @@ class Elastic(_Skeleton):
             nu: float | None = None,
             kind: str = "elastic",
         ) -> None: ...
+
+    def core(self) -> _core.Soil:
+        """The soil for the numerical core."""
+        return _core.Soil.elastic(G=self.shear_modulus, K=self.bulk_modulus)
 
 
 class PressureElastic(_Skeleton):
@@ -297,9 +300,19 @@ class PressureElastic(_Skeleton):
             kind: str = "pressure_elastic",
         ) -> None: ...
 
+    def core(self) -> _core.Soil:
+        """The soil for the numerical core."""
+        return _core.Soil.pressure_elastic(
+            G=self.shear_modulus, K=self.bulk_modulus, exponent=self.exponent, p_ref=self.p_ref
+        )
+
 
 class _Plastic(_Skeleton):
     """A soil with strength. The numerical core checks its parameters against one another."""
+
+    if TYPE_CHECKING:
+
+        def core(self) -> _core.Soil: ...
 
     def _check_set(self) -> None:
         """Refuse an incomplete set of parameters; the core checks the values."""
@@ -308,7 +321,7 @@ class _Plastic(_Skeleton):
     def _accepted_by_the_core(self) -> Self:
         self._check_set()
         try:
-            _core.small_strain_moduli(self.core(), (-100.0, -100.0, 0.0, -100.0))
+            self.core()
         except InvalidInput as error:
             remedy = field_remedy(type(self).model_fields[error.path])
             raise InvalidInput(f"material.{error.path}", error.value, error.allowed, remedy) from None
@@ -405,6 +418,22 @@ class DruckerPrager(_Frictional):
         names = ("c_residual", "phi_residual", "psi_residual")
         _require_softening_strain({name: getattr(self, name) for name in names}, self.softening_strain)
 
+    def core(self) -> _core.Soil:
+        """The soil for the numerical core."""
+        return _core.Soil.drucker_prager(
+            G=self.shear_modulus,
+            K=self.bulk_modulus,
+            c=self.c,
+            phi=self.phi,
+            psi=self.psi,
+            matching=self.matching,
+            tension_cutoff=self.tension_cutoff,
+            c_residual=self.c_residual,
+            phi_residual=self.phi_residual,
+            psi_residual=self.psi_residual,
+            softening_strain=self.softening_strain,
+        )
+
 
 class MohrCoulomb(_Frictional):
     """Mohr-Coulomb plasticity, non-associated, without hardening, with a tension cut-off.
@@ -433,6 +462,17 @@ class MohrCoulomb(_Frictional):
             kind: str = "mohr_coulomb",
             **long_names: float,
         ) -> None: ...
+
+    def core(self) -> _core.Soil:
+        """The soil for the numerical core."""
+        return _core.Soil.mohr_coulomb(
+            G=self.shear_modulus,
+            K=self.bulk_modulus,
+            c=self.c,
+            phi=self.phi,
+            psi=self.psi,
+            tension_cutoff=self.tension_cutoff,
+        )
 
 
 class TotalStress(_Plastic):
@@ -483,6 +523,18 @@ class TotalStress(_Plastic):
 
     def _check_set(self) -> None:
         _require_softening_strain({"Sr": self.Sr}, self.softening_strain)
+
+    def core(self) -> _core.Soil:
+        """The soil for the numerical core."""
+        return _core.Soil.total_stress(
+            G=self.shear_modulus,
+            K=self.bulk_modulus,
+            Su=self.Su,
+            criterion=self.criterion,
+            softening=self.softening,
+            Sr=self.Sr,
+            softening_strain=self.softening_strain,
+        )
 
 
 Material = Annotated[

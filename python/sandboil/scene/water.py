@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic.config import JsonDict
 
+from .. import _core
 from .._errors import InvalidInput
 from .._model import Model
 from .._types import MAX_PARTS, Floats, Many, NonNegative, Number, Point, Positive
@@ -104,12 +105,12 @@ class Conductivity(Model):
         def __init__(self, horizontal: float, vertical: float, *, angle_deg: float = 0.0) -> None: ...
 
     @property
-    def core(self) -> tuple[float, float, tuple[float, float]]:
-        """Largest and smallest value, m/s, and the direction of the largest."""
-        along = (cos(radians(self.angle_deg)), sin(radians(self.angle_deg)))
+    def core(self) -> _core.Conductivity:
+        """The largest and the smallest value and the direction of the largest, for the numerical core."""
+        x, y = cos(radians(self.angle_deg)), sin(radians(self.angle_deg))
         if self.horizontal >= self.vertical:
-            return self.horizontal, self.vertical, along
-        return self.vertical, self.horizontal, (-along[1], along[0])
+            return _core.Conductivity(major=self.horizontal, minor=self.vertical, direction=(x, y))
+        return _core.Conductivity(major=self.vertical, minor=self.horizontal, direction=(-y, x))
 
     @property
     def largest(self) -> float:
@@ -177,9 +178,11 @@ class VanGenuchten(Model):
         return self
 
     @property
-    def core(self) -> tuple[float, float, float, float]:
-        """The parameters as the numerical core takes them."""
-        return self.alpha, self.n, self.residual_saturation, self.full_saturation
+    def core(self) -> _core.Retention:
+        """The curve for the numerical core."""
+        return _core.Retention(
+            alpha=self.alpha, n=self.n, residual=self.residual_saturation, full=self.full_saturation
+        )
 
 
 def _tensor(value: object) -> object:

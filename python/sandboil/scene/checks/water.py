@@ -62,7 +62,7 @@ def check_moving_water(scene: Scene) -> None:
 
 
 def _is_permeable(scene: Scene) -> bool:
-    return any(region.conductivity[0] for region in scene.regions)
+    return any(region.conductivity.major for region in scene.regions)
 
 
 def _refuse_seepage(scene: Scene, stage: Seepage, place: int) -> None:
