@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import h5py
 import pytest
 import scenes
-from sandboil import Gravity, InvalidInput, Plan, Run, Shaking, Water
+from frozen import scenes as frozen_scenes
+from sandboil import (
+    Gravity,
+    InvalidInput,
+    Plan,
+    Run,
+    SandboilWarning,
+    Shaking,
+    Simulation,
+    Water,
+)
 from sandboil.run import plan as plan_module
 from sandboil.run.plan import pore_pressure_coefficients
+from sandboil.scene.physics import reasons
 
 
 def grown_bytes(run: Run) -> int:
@@ -71,12 +83,48 @@ def test_water_acceleration_is_told_as_the_solver_chose() -> None:
     assert told("implicit") == (False, "pore pressure diffusion is implicit")
 
 
+@pytest.mark.parametrize("name", frozen_scenes.ALL)
+def test_the_scene_and_the_core_agree_on_what_is_computed(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(plan_module, "TRIAL_SECONDS", 0.0)
+    scene = frozen_scenes.ALL[name](tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SandboilWarning)
+        planned = scene.plan().physics
+    foreseen = scene.active_physics()
+    # The core may still choose not to compute what is left to it.
+    left = {each.name for each in reasons(scene) if each.not_chosen}
+    assert left <= {"water acceleration"}
+    differing = [
+        (then, now)
+        for then, now in zip(foreseen, planned, strict=True)
+        if then.name not in left and then != now
+    ]
+    assert differing == []
+    assert all(then.on or not now.on for then, now in zip(foreseen, planned, strict=True))
+    assert all(fact.why for fact in planned)
+
+
+@pytest.mark.parametrize("name", ["level ground", "steady seepage"])
+def test_every_physics_of_the_core_has_its_reasons(name: str, tmp_path: Path) -> None:
+    scene = frozen_scenes.ALL[name](tmp_path)
+    simulation = Simulation(scene, threads=1)
+    names = set(simulation.physics)
+    simulation.begin_next_stage()
+    names |= set(simulation.physics)
+    told = {each.name for each in reasons(scene)}
+    assert names <= told
+    # Only a stage of seepage has that physics.
+    assert told - names == (set() if scene.seepage else {"seepage"})
+
+
 def test_a_dry_scene_without_shaking_plans_neither() -> None:
     plan = scenes.dry_column(stages=[Gravity()]).plan()
     assert plan.pore_pressure_coefficients == {}
     assert "coefficient B" not in str(plan)
     assert {name for name, on, _ in plan.physics if on} == {"velocity filter"}
-    assert set(plan.arrays) == {"motion", "stress", "geometry", "phases"}
+    assert set(plan.arrays) == {"motion", "constant_forces", "stress", "geometry", "phases"}
 
 
 def test_a_long_way_to_rest_is_not_foretold(monkeypatch: pytest.MonkeyPatch) -> None:

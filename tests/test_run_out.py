@@ -118,13 +118,13 @@ def test_only_ground_that_flows_pays_for_it() -> None:
 @pytest.mark.parametrize(
     ("stages", "expected"),
     [
-        ([sb.Gravity(), sb.RunOut(1.0)], (False, "soil keeps its water in a run-out")),
+        ([sb.Gravity(), sb.RunOut(1.0)], (True, "slope")),
         ([sb.Gravity(), sb.Shaking(duration=1.0), sb.RunOut(1.0)], (True, "slope")),
         ([sb.Gravity()], (True, "slope")),
     ],
 )
-def test_soil_keeps_its_water_in_a_run_out(stages: list[object], expected: tuple[bool, str]) -> None:
-    """The core computes no partial saturation there, so none is promised."""
+def test_soil_above_the_water_is_partly_saturated(stages: list[object], expected: tuple[bool, str]) -> None:
+    """Suction acts on its grains in every stage, also where its water stays."""
     (fact,) = [fact for fact in slope(*stages).active_physics() if fact.name == "partial saturation"]
     assert (fact.on, fact.why) == expected
 

@@ -20,6 +20,7 @@ from sandboil import (
     Output,
     Rayleigh,
     Region,
+    RunOut,
     Scene,
     Shaking,
     Water,
@@ -33,6 +34,7 @@ from sandboil._errors import InvalidInput
 from sandboil.core.description import section_description
 from sandboil.motion import Motion
 from sandboil.scene.phases import REFERENCE_WATER_DENSITY
+from sandboil.scene.rules import MESSAGES
 from sandboil.scene.soils import Elastic, PM4Sand
 
 LEVEL_GROUND = Path(__file__).parents[1] / "examples" / "level_ground"
@@ -369,6 +371,13 @@ def test_memory_of_gaps_is_an_option_of_the_sand() -> None:
 def test_the_core_refuses_unknown_and_missing_names(make: Callable[[], object]) -> None:
     with pytest.raises(TypeError, match="argument"):
         make()
+
+
+def test_every_rule_of_the_core_has_its_message() -> None:
+    assert list(MESSAGES) == _core.RULES
+    for message in MESSAGES.values():
+        parts = {"numerics": [Numerics], "stage": [Shaking, RunOut]}[message.part]
+        assert any(message.field in part.model_fields for part in parts)
 
 
 def test_descriptions_do_not_change() -> None:

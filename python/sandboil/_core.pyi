@@ -502,6 +502,8 @@ class Seepage:
         """Places and inflow along a condition, (k, 3): x, y (m) and m3/s per m."""
     def balance(self) -> tuple[NDArray[np.float64], float]:
         """Inflow through each condition since the start, and increase of the stored water, m3 per m."""
+    def physics(self) -> dict[str, bool]:
+        """Names of the physics of such a stage, and whether this one computes it."""
     def arrays(self) -> list[tuple[str, int]]:
         """Names and bytes of the arrays that exist."""
     def counters(self) -> dict[str, int]:

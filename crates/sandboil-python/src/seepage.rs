@@ -13,6 +13,8 @@ use sandboil_solver as solver;
 pub struct Seepage {
     inner: solver::Seepage,
     until: solver::Until,
+    /// Whether pores hold air, or may lose water.
+    holds_air: bool,
     is_complete: bool,
 }
 
@@ -32,7 +34,9 @@ impl Seepage {
         let inner =
             py.detach(|| solver::Seepage::new(model, &model.pore_pressure, boundaries)).map_err(CoreError)?;
         let until = duration.map_or(solver::Until::Steady, solver::Until::Time);
-        Ok(Self { inner, until, is_complete: false })
+        let holds_air = model.saturation.iter().any(|share| *share < 1.0)
+            || model.regions.iter().any(|region| region.retention.is_some());
+        Ok(Self { inner, until, holds_air, is_complete: false })
     }
 
     /// Continues until `until` (s) or the end, or until `steps` are made or `seconds` have passed; returns whether the
@@ -103,6 +107,11 @@ impl Seepage {
     fn balance<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, f64) {
         let balance = self.inner.balance();
         (balance.inflow.to_pyarray(py), balance.stored)
+    }
+
+    /// Names of the physics of such a stage, and whether this one computes it.
+    fn physics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        [("pore water", true), ("seepage", true), ("partial saturation", self.holds_air)].into_py_dict(py)
     }
 
     /// Bytes held by the section's tables, by name.

@@ -12,9 +12,6 @@ from .._types import Floats
 if TYPE_CHECKING:
     from ..scene.scene import Scene
 
-# The core's name of the flow scheme with the acceleration of the pore water.
-ACCELERATED_FLOW = "explicit with acceleration term"
-
 
 @dataclass(frozen=True)
 class Quantity:

@@ -22,7 +22,6 @@ from .doubts import doubts
 from .motions import loaded_motions
 from .probes import probes_of
 from .quantities import (
-    ACCELERATED_FLOW,
     CHANNELS,
     ENVELOPES,
     SEEPAGE_FIELDS,
@@ -462,14 +461,14 @@ class Simulation:
         return float(np.mean(impedance)) if impedance else None
 
     @property
+    def physics(self) -> dict[str, bool]:
+        """Names of the physics that a stage may compute, and whether the present stage does."""
+        return self._present.physics()
+
+    @property
     def flow_scheme(self) -> str:
         """How pore pressure is advanced in the stage: "none", "undrained", "explicit", "implicit", ..."""
         return "seepage" if self._grains is None else self._grains.flow_scheme
-
-    @property
-    def accelerates_water(self) -> bool:
-        """Whether the pore water's acceleration enters the flow in the stage."""
-        return self.flow_scheme == ACCELERATED_FLOW
 
     @property
     def stress_nodes(self) -> int:

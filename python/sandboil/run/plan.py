@@ -20,7 +20,7 @@ from ..ground.discretise import discretise
 from ..motion import Motion
 from ..motion._motion import SIGNIFICANT
 from ..scene.motion_spec import MotionSpec
-from ..scene.physics import WATER_ACCELERATION, Physics
+from ..scene.physics import Physics, computed_physics
 from ..scene.stages import AnyStage
 from .accuracy import with_accuracy
 
@@ -74,7 +74,7 @@ class Plan:
     spacing : (dx, dy), m
     threads : that the trial ran on
     accuracy : preset that filled what the scene leaves open
-    physics : (name, on, why) of all that a scene can leave out
+    physics : (name, on, why) of all that a scene can leave out; on if the core computes it in any stage
     stages : cost of each
     arrays : bytes of the core's arrays by name, in the last stage
     file_size : fields and histories in the results before compression, bytes
@@ -206,9 +206,12 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
         warnings.simplefilter("ignore", SandboilWarning)
         simulation = Simulation(_from_strong_part(scene), threads)
     stages = []
+    computed: dict[str, bool] = {}
     for index, stage in enumerate(scene.stages):
         if index > 0:
             simulation.begin_next_stage()
+        for name, is_on in simulation.physics.items():
+            computed[name] = is_on or computed.get(name, False)
         dt, dt_limit, undamped_dt = simulation.dt, simulation.dt_limit, simulation.undamped_dt
         start = time.perf_counter()
         trial_end = start + TRIAL_SECONDS
@@ -241,23 +244,13 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
         spacing=simulation.particles.spacing,
         threads=threads,
         accuracy=accuracy,
-        physics=_physics(scene, simulation),
+        physics=computed_physics(scene, computed),
         stages=stages,
         arrays=simulation.arrays(),
         file_size=_file_size(scene, simulation, stages),
         pore_pressure_coefficients=pore_pressure_coefficients(scene),
         doubts=found,
     )
-
-
-def _physics(scene: Scene, simulation: Simulation) -> list[Physics]:
-    """The scene's physics; what it leaves to the solver, as the last stage has chosen."""
-    return [
-        fact._replace(on=False, why=f"pore pressure diffusion is {simulation.flow_scheme}")
-        if fact.name == WATER_ACCELERATION and fact.on and not simulation.accelerates_water
-        else fact
-        for fact in scene.active_physics()
-    ]
 
 
 def _from_strong_part(scene: Scene) -> Scene:

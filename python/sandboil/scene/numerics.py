@@ -7,9 +7,11 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, StrictBool, model_validator
 from pydantic.config import JsonDict
 
+from .. import _core
 from .._errors import InvalidInput
 from .._model import Model
 from .._types import Number, Positive
+from .rules import MESSAGES
 
 # Strength of the velocity filter: enough that liquefied sand keeps no grid-scale noise that would change an
 # answer, while a wave of 20 particles loses only 0.04 % to it (validation/README.md).
@@ -85,14 +87,18 @@ class Numerics(Model):
                 "has no effect on the printed operators, which have no filter",
                 "leave it out, or take operators = 'conservative'",
             ),
-            (
-                "dispersion_correction",
-                self.operators == "printed" and self.dispersion_correction,
-                "cannot be used with the printed operators, whose force is not the transpose of their strain",
-                "leave it out, or take operators = 'conservative'",
-            ),
         ]
         for name, is_idle, allowed, remedy in idle:
             if is_idle:
                 raise InvalidInput(f"numerics.{name}", getattr(self, name), allowed, remedy)
+        return self
+
+    @model_validator(mode="after")
+    def _no_broken_rule(self) -> Numerics:
+        """Refuse choices that exclude each other in any scene."""
+        choices = _core.Choices(
+            printed_operators=self.operators == "printed", dispersion_correction=self.dispersion_correction
+        )
+        for name in _core.broken_rules(choices):
+            raise MESSAGES[name].refusal(self._label, self)
         return self

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,9 +16,7 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 _DRY, _STILL = "the scene has no water", "no shaking stage"
-
-# Name of the physics that a plan corrects by a trial.
-WATER_ACCELERATION = "water acceleration"
+_IMPLICIT = "pore pressure diffusion is implicit"
 
 
 class Physics(NamedTuple):
@@ -28,18 +27,48 @@ class Physics(NamedTuple):
     why: str
 
 
-def _physics(name: str, why: str, *missing: tuple[bool, str]) -> Physics:
-    """Physics that is on for a reason, or off for the first of the reasons that apply."""
-    lacking = [reason for applies, reason in missing if applies]
-    return Physics(name, not lacking, lacking[0] if lacking else why)
+class Reasons(NamedTuple):
+    """Why a part of the physics, by its name in the core, is on or off.
+
+    Attributes
+    ----------
+    on : why it is on, if it is
+    off : why the scene leaves it out; empty if it does not
+    not_chosen : why the core may leave it out all the same; empty if the choice is not left to the core
+    """
+
+    name: str
+    on: str
+    off: str
+    not_chosen: str = ""
 
 
-def active_physics(scene: Scene) -> list[Physics]:
-    """Everything that a scene can leave out."""
+def _reasons(name: str, on: str, *missing: tuple[bool, str]) -> Reasons:
+    """Reasons of physics that is off for the first of the reasons that apply."""
+    return Reasons(name, on, next((reason for applies, reason in missing if applies), ""))
+
+
+def reasons(scene: Scene) -> list[Reasons]:
+    """Why each part of the physics that a scene can leave out is on or off."""
     return [*_of_water(scene), *_of_soil(scene), *_of_edges(scene), *_of_numerics(scene)]
 
 
-def _of_water(scene: Scene) -> list[Physics]:
+def active_physics(scene: Scene) -> list[Physics]:
+    """Everything that a scene can leave out; what the scene leaves to the core is on."""
+    return [Physics(each.name, not each.off, each.off or each.on) for each in reasons(scene)]
+
+
+def computed_physics(scene: Scene, computed: Mapping[str, bool]) -> list[Physics]:
+    """Everything that a scene can leave out, on where the core has computed it in a stage."""
+    return [
+        Physics(each.name, True, each.on)
+        if computed.get(each.name, False)
+        else Physics(each.name, False, each.off or each.not_chosen)
+        for each in reasons(scene)
+    ]
+
+
+def _of_water(scene: Scene) -> list[Reasons]:
     dry, moves = (scene.water is None, _DRY), any(stage.moves for stage in scene.stages)
     permeable = [region.name for region in scene.regions if region.hydraulic_conductivity]
     no_flow = (dry, (not moves, _STILL), (not permeable, "no region is permeable"))
@@ -51,20 +80,26 @@ def _of_water(scene: Scene) -> list[Physics]:
     if term != "auto":
         chosen = f"numerics.acceleration_term is {term!r}"
     return [
-        _physics("pore water", _water_level(scene), dry),
-        _physics(
+        _reasons("pore water", _water_level(scene), dry),
+        _reasons(
             "seepage",
             "to its steady state" if steady else "for its duration",
             dry,
             (seepage is None, "no seepage stage"),
         ),
-        _physics("water diffusion", f"conductivity in {', '.join(permeable)}", *no_flow),
-        _physics(WATER_ACCELERATION, chosen, *no_flow, (not scene.uses_acceleration_term, chosen)),
-        _physics(
+        _reasons("water diffusion", f"conductivity in {', '.join(permeable)}", *no_flow),
+        _reasons(
+            "water acceleration",
+            chosen,
+            *no_flow,
+            (not scene.uses_acceleration_term, chosen),
+            (scene.numerics.diffusion == "implicit", _IMPLICIT),
+        )._replace(not_chosen=_IMPLICIT if scene.numerics.diffusion == "auto" else ""),
+        _reasons(
             "partial saturation",
             ", ".join(region.name for region in scene.regions if region.retention) or "dry above the water",
             dry,
-            *_always_full(scene),
+            (_is_always_full(scene), "the water table is nowhere below the ground"),
         ),
     ]
 
@@ -76,23 +111,19 @@ def _water_level(scene: Scene) -> str:
     return f"water table at elevation {level}"
 
 
-def _always_full(scene: Scene) -> list[tuple[bool, str]]:
-    """Why no pore is partly saturated, or why that has no effect."""
+def _is_always_full(scene: Scene) -> bool:
+    """Whether no pore holds air at any time."""
     curves = scene.holds_suction and any(region.retention for region in scene.regions)
-    changed = curves and any(stage.conditions for _, stage in scene.shakings)
-    run_out_alone = scene.run_out is not None and scene.seepage is None and not scene.shakings
-    return [
-        (not scene.is_partly_saturated and not changed, "the water table is nowhere below the ground"),
-        (run_out_alone, "soil keeps its water in a run-out"),
-    ]
+    drained = curves and any(stage.conditions for _, stage in scene.shakings)
+    return not scene.is_partly_saturated and not drained
 
 
-def _of_soil(scene: Scene) -> list[Physics]:
+def _of_soil(scene: Scene) -> list[Reasons]:
     # Linear elasticity has no state besides the stress.
     stateful = [region.name for region in scene.regions if not isinstance(region.material, Elastic)]
     moves = any(stage.moves for stage in scene.stages)
     return [
-        _physics(
+        _reasons(
             "soil state",
             f"in {', '.join(stateful)}",
             (not stateful, "every region is linearly elastic"),
@@ -101,26 +132,26 @@ def _of_soil(scene: Scene) -> list[Physics]:
     ]
 
 
-def _of_edges(scene: Scene) -> list[Physics]:
+def _of_edges(scene: Scene) -> list[Reasons]:
     shakings = [stage for _, stage in scene.shakings]
     still = (not shakings, _STILL)
     absorbing = [stage for stage in shakings if stage.base_vertical == "absorbing"]
     passing = [passage for stage in shakings if (passage := _passage(stage.base))]
     return [
-        _physics("base dashpots", "compliant base while shaking", still),
-        _physics(
+        _reasons("base dashpots", "compliant base while shaking", still),
+        _reasons(
             "vertical waves",
             "under a vertical motion" if any(s.vertical for s in absorbing) else "the base absorbs them",
             still,
             (not absorbing, "the base is a roller vertically"),
         ),
-        _physics(
+        _reasons(
             "wave passage",
             "; ".join(passing),
             still,
             (not passing, "the wave reaches all of the base at once"),
         ),
-        _physics(
+        _reasons(
             "free-field columns",
             _columns(scene),
             (scene.is_periodic, "the sides are periodic"),
@@ -155,34 +186,35 @@ def _columns(scene: Scene) -> str:
     return f"on the {hands}: {number} of {particles} particles{' in all' if len(distinct) > 1 else ''}"
 
 
-def _of_numerics(scene: Scene) -> list[Physics]:
+def _of_numerics(scene: Scene) -> list[Reasons]:
     numerics, run_out = scene.numerics, scene.run_out
     moves, still = any(stage.moves for stage in scene.stages), (not scene.shakings, _STILL)
+    filtered = f"numerics.velocity_filter is {numerics.filter_strength:g}"
     damped = [str(stage.rayleigh) for _, stage in scene.shakings if stage.rayleigh]
     return [
-        _physics(
+        _reasons(
             "local damping",
             f"numerics.local_damping is {numerics.local_damping:g}",
             (not moves, _STILL),
             (numerics.local_damping == 0.0, "numerics.local_damping is 0"),
         ),
-        _physics("Rayleigh damping", "; ".join(damped), still, (not damped, "no shaking stage has it")),
-        _physics(
+        _reasons("Rayleigh damping", "; ".join(damped), still, (not damped, "no shaking stage has it")),
+        _reasons(
             "dispersion correction",
             "numerics.dispersion_correction is true",
             still,
             (not numerics.dispersion_correction, "numerics.dispersion_correction is false"),
         ),
-        _physics(
+        _reasons(
             "run-out",
             f"large displacements, viscosity {run_out.viscosity:g}" if run_out else "",
             (run_out is None, "no run-out stage"),
         ),
-        Physics(
+        _reasons(
             "velocity filter",
-            numerics.filter_strength > 0.0,
-            "the printed operators have none"
-            if numerics.operators == "printed"
-            else f"numerics.velocity_filter is {numerics.filter_strength:g}",
+            filtered,
+            (scene.is_at_rest, "no stage moves the ground"),
+            (numerics.operators == "printed", "the printed operators have none"),
+            (numerics.filter_strength == 0.0, filtered),
         ),
     ]

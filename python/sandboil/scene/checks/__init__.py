@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from .bases import check_bases
-from .numerics import check_damping, check_inertia, check_printed_water
 from .output import check_depths, check_frames, check_points
+from .rules import check_choices
 from .section import check_names, check_overlaps, check_section, check_sides, check_size, check_spacing
 from .soils import check_densities, check_materials
 from .stages import check_order, check_run_out
@@ -31,10 +31,8 @@ CHECKS: tuple[Callable[[Scene], None], ...] = (
     check_materials,
     check_order,
     check_run_out,
+    check_choices,
     check_bases,
-    check_damping,
-    check_inertia,
-    check_printed_water,
     check_frames,
     check_depths,
     check_points,
