@@ -416,15 +416,18 @@ def _read_results(path: Path) -> None:
     run.time_steps()
 
 
-KEYS = [("shaking", hand, "0123456789abcdef") for hand in columns.HANDS]
+COLUMNS = [columns.Column("shaking", hand, "0123456789abcdef") for hand in columns.HANDS]
+# Values of a frame of three wet rows.
+WIDTH = 44
 
 
 def _columns(folder: Path) -> bytes:
     rng = np.random.default_rng(1)
-    for stage, hand, key in KEYS:
-        columns.save(
-            folder, stage, hand, key, columns.ColumnRecord(0.0025, np.ones((3, 3)), True, rng.random((8, 20)))
+    for column in COLUMNS:
+        record = _core.ColumnRecord(
+            interval=0.0025, impedance=np.ones((3, 3)), wet=True, values=rng.random((8, WIDTH))
         )
+        columns.save(folder, column, record)
     return (folder / columns.FILE_NAME).read_bytes()
 
 
@@ -464,7 +467,10 @@ def readers(folder: Path) -> dict[str, Callable[[], Reader]]:
 
     def columns_file() -> Reader:
         return Reader(
-            [_columns(folder)], lambda path: columns.load(path.parent, KEYS), columns.FILE_NAME, is_text=False
+            [_columns(folder)],
+            lambda path: columns.load(path.parent, COLUMNS),
+            columns.FILE_NAME,
+            is_text=False,
         )
 
     return {

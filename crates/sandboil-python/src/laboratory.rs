@@ -1,4 +1,4 @@
-//! The laboratory's specimen: a material point under test, of a model of ours or of one written in Python.
+//! The laboratory's specimen: a material point under test, of a soil of the core or of a model written in Python.
 
 use crate::{
     errors::refused,
@@ -188,14 +188,14 @@ impl Specimen {
         let turns = match (count, turns.as_slice()) {
             (None, _) => Turns::Each(turns),
             (Some(count), &[odd, even]) => Turns::Alternating { odd, even, count },
-            _ => return Err(PyValueError::new_err("count goes with two turns")),
+            _ => return Err(PyValueError::new_err("count needs two turns")),
         };
         let test = Shear { drained, turns, strain_step, strain_limit };
         let record = Record::new(Resolution { stress: stress_resolution, strain: strain_resolution });
         self.run(py, record, move |specimen, record, stop| specimen.shear(&test, record, stop))
     }
 
-    /// Leads the specimen through rows of `(xx, yy, xy)`, each component a stress (kPa) where `by_stress` says so,
+    /// Loads the specimen through rows of `(xx, yy, xy)`, each component a stress (kPa) if `by_stress` is true for it,
     /// else a total strain. Returns the record and how it ended.
     #[pyo3(signature = (rows, *, by_stress, strain_step, stress_resolution, strain_resolution))]
     fn path<'py>(
@@ -213,12 +213,12 @@ impl Specimen {
         self.run(py, record, move |specimen, record, stop| specimen.path(&path, record, stop))
     }
 
-    /// Another specimen in the same state, to go on with while this one stays.
+    /// Another specimen in the same state.
     fn copy(&self) -> Self {
         Self { inner: self.inner.copy(), raised: self.raised.clone() }
     }
 
-    /// Switches to reconsolidation after shaking; returns whether the model makes a difference.
+    /// Switches to reconsolidation after shaking; returns whether the model has another law for it.
     fn reconsolidate(&mut self) -> bool {
         self.inner.reconsolidate()
     }
@@ -252,7 +252,7 @@ impl Specimen {
         self.inner.point().plastic_shear_strain()
     }
 
-    /// Work done by the model, by kind, trials that were given up included.
+    /// Counts of operations of the model by name, including trials that were given up.
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.inner.report().named().into_py_dict(py)
     }
@@ -279,12 +279,12 @@ impl Specimen {
             return Err(signal);
         }
         if let Some(raised) = self.raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            // A trial that failed and was mended by a smaller one is no failure of the test.
+            // A trial that failed and was repeated with a smaller step is no failure of the test.
             if matches!(ending, Ending::Refused(SoilError::Outside(_))) {
                 return Err(raised);
             }
         }
-        Ok((columns(py, &record)?, told(&ending)))
+        Ok((columns(py, &record)?, message(&ending)))
     }
 }
 
@@ -308,7 +308,7 @@ pub fn columns<'py>(py: Python<'py>, record: &Record) -> PyResult<Bound<'py, PyD
 }
 
 /// How a test ended: `complete`, `strain limit`, or a reason in words.
-fn told(ending: &Ending) -> String {
+fn message(ending: &Ending) -> String {
     match ending {
         Ending::Complete => "complete".into(),
         Ending::StrainLimit => "strain limit".into(),

@@ -137,7 +137,7 @@ impl Simulation {
         self.inner.arrays()
     }
 
-    /// Work done, by kind.
+    /// Counts of operations by name.
     fn counters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         counted(py, &self.inner.counters())
     }
@@ -216,7 +216,7 @@ impl Simulation {
     }
 }
 
-/// Work done, by kind, as a dictionary.
+/// Counts of operations by name.
 pub fn counted<'py>(py: Python<'py>, counters: &solver::Counters) -> PyResult<Bound<'py, PyDict>> {
     [
         ("steps", counters.steps),
