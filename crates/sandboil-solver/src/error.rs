@@ -1,4 +1,4 @@
-//! What can go wrong in a solve, with the numbers a user needs to find the place.
+//! Errors of the solver, with the numbers that a user needs to find the place.
 
 use sandboil_soil::SoilError;
 
@@ -6,7 +6,7 @@ use sandboil_soil::SoilError;
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum SolverError {
-    /// An input outside its range; refused before any work.
+    /// An input outside its range, refused before any work.
     #[error("{name} = {value}: must be {expected}")]
     InvalidInput {
         /// Name of the quantity.
@@ -16,7 +16,7 @@ pub enum SolverError {
         /// What is allowed.
         expected: &'static str,
     },
-    /// Arrays whose lengths contradict each other.
+    /// An array of the wrong length.
     #[error("{name} has {found} entries, {expected} are needed")]
     Shape {
         /// Name of the array.
@@ -26,15 +26,15 @@ pub enum SolverError {
         /// Length needed.
         expected: usize,
     },
-    /// A call that needs another stage first.
+    /// A call that is not possible in the present state.
     #[error("{call} needs {needs} first")]
     Order {
-        /// What was called.
+        /// The call.
         call: &'static str,
-        /// What has to come before.
+        /// What the call needs.
         needs: &'static str,
     },
-    /// A field left the range of finite or sensible numbers.
+    /// A value that is not finite, or is outside its physical range.
     #[error("{quantity} of node {node} at ({x:.3}, {y:.3}) m is {value} at time {time:.6} s, step {step}")]
     Diverged {
         /// The field.
@@ -45,26 +45,26 @@ pub enum SolverError {
         x: f64,
         /// Position, m.
         y: f64,
-        /// The offending value.
+        /// The value.
         value: f64,
         /// Time in the stage, s.
         time: f64,
-        /// Step in the stage.
+        /// Number of the step in the stage.
         step: u64,
     },
-    /// The static stage did not reach its tolerance.
+    /// A static stage that did not reach its tolerance.
     #[error(
-        "gravity stage not at rest after {steps} steps: max |a|/g {residual:.2e}, wanted {tolerance:.1e}"
+        "gravity stage not at rest after {steps} steps: max |a|/g {residual:.2e}, tolerance {tolerance:.1e}"
     )]
     NotAtRest {
-        /// Steps made.
+        /// Number of steps made.
         steps: u64,
         /// Largest unbalanced acceleration over gravity.
         residual: f64,
-        /// Tolerance asked.
+        /// The tolerance.
         tolerance: f64,
     },
-    /// The flow of water has no solution that could be found.
+    /// A step of the seepage for which no solution was found.
     #[error("seepage at time {time:.6} s: {reason}")]
     Seepage {
         /// Time in the stage, s.
@@ -72,39 +72,39 @@ pub enum SolverError {
         /// What failed.
         reason: &'static str,
     },
-    /// A soil model refused its input or failed.
+    /// A soil model that refused its input or failed.
     #[error("soil model of region {region}, node {node}: {source}")]
     Soil {
         /// Region index.
         region: usize,
         /// Node in the user's order.
         node: usize,
-        /// The model's own words.
+        /// The error of the model.
         source: SoilError,
     },
-    /// A free-field column failed.
+    /// A free-field column that failed.
     #[error("free-field column on the {side}: {source}")]
     Column {
         /// Left or right.
         side: &'static str,
-        /// What happened to it; its nodes count from below.
+        /// The error of the column; its nodes are numbered from below.
         source: Box<SolverError>,
     },
-    /// A stored state cannot be gone on with.
+    /// Stored bytes from which a simulation cannot continue.
     #[error(transparent)]
     State(#[from] StateError),
-    /// The thread pool could not be made.
+    /// A thread pool that could not be started.
     #[error("cannot start {threads} threads: {reason}")]
     Threads {
-        /// Threads asked.
+        /// Number of threads.
         threads: usize,
-        /// The operating system's words.
+        /// The message of the operating system.
         reason: String,
     },
 }
 
 impl SolverError {
-    /// The error of a soil model with its node in the user's order: `order` has the user's index of each node.
+    /// The error, with the node of a soil model in the user's order; `order` is the user's index of each node.
     pub(crate) fn in_user_order(mut self, order: &[usize]) -> Self {
         if let Self::Soil { node, .. } = &mut self {
             *node = order[*node];
@@ -112,7 +112,7 @@ impl SolverError {
         self
     }
 
-    /// Quantity, node and value of the error of a soil model in a step; `None` of other errors.
+    /// Quantity, node and value of an error of a soil model in a step; `None` for other errors.
     pub(crate) fn soil_divergence(&self) -> Option<(&'static str, usize, f64)> {
         match self {
             Self::Soil { node, source: SoilError::StrainIncrementTooLarge { value, .. }, .. } => {
@@ -124,27 +124,27 @@ impl SolverError {
     }
 }
 
-/// Why stored bytes cannot be gone on with.
+/// Reason why a simulation cannot continue from stored bytes.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StateError {
-    /// Bytes of something else.
-    #[error("is no stored simulation")]
+    /// Bytes that are not a stored simulation.
+    #[error("is not a stored simulation")]
     Foreign,
-    /// Bytes of another layout.
-    #[error("has format version {found}, and {needed} is needed")]
+    /// Bytes of another format version.
+    #[error("has format version {found}, this build reads {needed}")]
     Version {
         /// The version found.
         found: u32,
         /// The version of this build.
         needed: u32,
     },
-    /// Bytes that are not as they were written.
+    /// Bytes that have changed since they were written.
     #[error("is damaged: {0}")]
     Damaged(&'static str),
-    /// Bytes that another build wrote.
+    /// Bytes written by another build.
     #[error("was stored by another build of sandboil")]
     Build,
     /// A state of another section.
-    #[error("is that of another section")]
+    #[error("belongs to another section")]
     OtherModel,
 }

@@ -1,5 +1,5 @@
-//! Three-phase solver for saturated ground under static and seismic load: fields, momentum, flow, stress,
-//! boundaries, stepping and stages. It knows no file and no Python.
+//! Three-phase solver for saturated and partly saturated ground under static and seismic load: fields, momentum,
+//! flow, stress, boundaries, stepping and stages. It reads and writes no files and does not depend on Python.
 //!
 //! Equation numbers are those of Mhaski & Ramana (2025), CMES 142(1). Units: kN, m, s, Mg; stress tension
 //! positive, pore pressure compression positive; x horizontal, y up.
@@ -50,5 +50,5 @@ pub use water::{
     seepage::{Seepage, SeepageCounters, Until, WaterBalance},
 };
 
-/// A section under one stage after the other, beside free-field columns where it asks for them.
+/// A section under successive stages, with free-field columns where a stage has free-field sides.
 pub type Simulation = run::simulation::Driver<neighbours::free_field::FreeField>;

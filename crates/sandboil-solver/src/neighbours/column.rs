@@ -1,5 +1,5 @@
-//! The ground beyond a free-field side: a column one node wide, its own image on both sides. It is solved step by step
-//! with the section, or read from the record of an earlier run.
+//! The ground beyond a free-field side: a column one node wide between periodic sides. It is solved together with the
+//! section, step by step, or read from the record of an earlier run.
 
 use crate::{
     edges::base::Impedance,
@@ -14,18 +14,18 @@ use crate::{
 };
 use sandboil_sph::Vec2;
 
-/// What a section reads of its column in a step. Rows count from below.
+/// State and motion of a column in a step, for the section beside it. Rows are numbered from below.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Present {
-    /// Nominal effective stress of both stress nodes of every row at the step's beginning, kPa.
+    /// Nominal effective stress of both stress nodes of each row at the start of the step, kPa.
     pub stress: Vec<[f64; COMPONENTS]>,
-    /// Nominal excess pore pressure of every row, `q J F^-T`, kPa; empty without water.
+    /// Nominal excess pore pressure of each row, `q J F^-T`, kPa; empty without water.
     pub water: Vec<[f64; COMPONENTS]>,
-    /// Velocity of every row half a step before, m/s.
+    /// Velocity of each row half a step before the start of the step, m/s.
     pub velocity_before: Vec<Vec2>,
-    /// Velocity of every row half a step after, m/s.
+    /// Velocity of each row half a step after the start of the step, m/s.
     pub velocity: Vec<Vec2>,
-    /// Acceleration of every row, m/s2.
+    /// Acceleration of each row, m/s2.
     pub acceleration: Vec<Vec2>,
     /// Mean traction of the compliant base over the step, kPa.
     pub base_traction: Vec2,
@@ -45,7 +45,7 @@ impl Present {
     }
 }
 
-/// A column and what a section reads of it.
+/// A column beside a section, solved or read from a record.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Column {
     source: Source,
@@ -71,7 +71,7 @@ impl Column {
     /// A column at rest.
     ///
     /// # Errors
-    /// A column that finds no rest.
+    /// A column that does not come to rest.
     pub fn at_rest(model: &Model, gravity: Option<Gravity>) -> Result<Self, SolverError> {
         let mut simulation = Driver::new(model, 1)?;
         if let Some(gravity) = gravity {
@@ -84,7 +84,7 @@ impl Column {
         Ok(Self { source, present, recorder: None })
     }
 
-    /// A column that does what it did before.
+    /// A column that is read from a record.
     pub fn recorded(record: ColumnRecord) -> Self {
         let (rows, wet) = (record.rows(), record.wet);
         let frame = vec![0.0; ColumnRecord::width(rows, wet)];
@@ -92,11 +92,11 @@ impl Column {
         Self { source, present: Present::of_rows(rows, wet), recorder: None }
     }
 
-    /// Begins a stage. With an interval (s) what the column does is recorded. A column that is read goes on with the
-    /// stage's own record.
+    /// Begins a stage. A column that is solved is recorded if there is an interval (s). A column that is read needs the
+    /// `record` of this stage.
     ///
     /// # Errors
-    /// Soil that refuses its stress, or a record of another column, too short or missing.
+    /// Soil that refuses its stress, or a record that is missing, too short or of another column.
     pub fn begin(
         &mut self,
         stage: Stage,
@@ -110,7 +110,7 @@ impl Column {
                 let Some(record) = record else {
                     return Err(SolverError::Order {
                         call: "begin",
-                        needs: "a record of the stage for columns that are read",
+                        needs: "a record of this stage, because the column is read from records",
                     });
                 };
                 record.validate(rows, wet, stage.duration())?;
@@ -127,7 +127,7 @@ impl Column {
         Ok(())
     }
 
-    /// What a section reads.
+    /// State and motion in the present step.
     pub fn present(&self) -> &Present {
         &self.present
     }
@@ -137,7 +137,7 @@ impl Column {
         self.present.velocity.len()
     }
 
-    /// Density and small-strain wave speeds of every row, from below.
+    /// Density and small-strain wave speeds of each row, from below.
     ///
     /// # Errors
     /// Soil that refuses its stress.
@@ -158,7 +158,7 @@ impl Column {
         }
     }
 
-    /// Gives every row an excess pore pressure, kPa, held in balance.
+    /// Sets the excess pore pressure of each row, kPa. Constant forces keep the balance.
     pub fn set_excess(&mut self, excess: impl Iterator<Item = f64>) {
         if let Source::Solved { simulation, rows } = &mut self.source {
             simulation.hold_excess(rows.iter().copied().zip(excess));
@@ -166,7 +166,7 @@ impl Column {
         self.observe();
     }
 
-    /// Builds the column's geometry anew where its nodes now are.
+    /// Renews the geometry of the column at the present positions of its nodes.
     pub fn renew_geometry(&mut self) {
         self.observe();
         let before = self.present.clone();
@@ -179,7 +179,7 @@ impl Column {
         }
     }
 
-    /// Reads stress and pressure at the beginning of a step.
+    /// Updates stress and pressure to those at the start of a step.
     pub fn observe(&mut self) {
         let Present { stress, water, .. } = &mut self.present;
         match &mut self.source {
@@ -203,7 +203,7 @@ impl Column {
         }
     }
 
-    /// Makes the step of `dt` seconds whose beginning has been observed.
+    /// Makes a step of `dt` seconds, after [`Self::observe`] at its start.
     ///
     /// # Errors
     /// A column that has diverged.
@@ -225,7 +225,8 @@ impl Column {
                 }
             }
             Source::Recorded { record, time, frame } => {
-                // The first values of the frame are read at the step's beginning, its motion half a step later.
+                // Stress, pressure and traction are those at the start of the step, the motion is that half a
+                // step later.
                 let motion = COMPONENTS * (stress.len() + water.len());
                 *base_traction = Vec2::new(frame[frame.len() - 2], frame[frame.len() - 1]);
                 record.at(*time + 0.5 * dt, frame);
@@ -239,7 +240,7 @@ impl Column {
         Ok(())
     }
 
-    /// The record of the stage so far, if it is kept.
+    /// Takes out the record of the stage up to the present step, if the column is recorded.
     pub fn take_record(&mut self) -> Option<ColumnRecord> {
         self.recorder.take().map(Recorder::closed)
     }
@@ -255,11 +256,12 @@ impl Column {
     }
 }
 
-/// Frames of a column under way.
+/// Frames of the present stage of a column.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 struct Recorder {
     record: ColumnRecord,
-    /// Values from which increments count; at a renewal of the geometry they take over its change of frame.
+    /// Values at which the recorded increments are zero. A renewal of the geometry changes them by its change
+    /// of the nominal values.
     origin: Vec<f64>,
     /// Time (s) and values of the last step.
     last: (f64, Vec<f64>),
@@ -290,7 +292,7 @@ impl Recorder {
         }
     }
 
-    /// Takes the step that began at `time`, s.
+    /// Adds the frames up to `time`, the start of the last step, s.
     fn push(&mut self, time: f64, present: &Present) {
         flatten(present, &mut self.sample);
         for (value, origin) in self.sample.iter_mut().zip(&self.origin) {
@@ -308,8 +310,8 @@ impl Recorder {
         last.copy_from_slice(&self.sample);
     }
 
-    /// The record, with a frame after the last step: straight on from the last one through the last step's values. A
-    /// stage ends within half a step after those, so two frames at most.
+    /// The record, with two more frames, extrapolated linearly from the last frame through the values of the
+    /// last step. Two are enough, because a stage ends at most half a step after these values.
     fn closed(mut self) -> ColumnRecord {
         let width = self.sample.len();
         let (time, values) = &self.last;
@@ -326,7 +328,7 @@ impl Recorder {
     }
 }
 
-/// Writes a frame: stress, water, velocity at the step's beginning, traction.
+/// Writes a frame: stress, pore pressure, velocity at the start of the step, traction.
 fn flatten(present: &Present, into: &mut [f64]) {
     let tensors = present.stress.iter().chain(&present.water).flatten().copied();
     let motion = present.velocity_before.iter().zip(&present.velocity);

@@ -1,11 +1,13 @@
-//! Free-field sides (Section 4.2): beyond each side the ground goes on as a column that moves on its own, solved first and
-//! one-way. It pushes the section with its stress, and dashpots between the two let out what the section sends.
+//! Free-field sides (Section 4.2). Beyond each side the ground is a column that is solved before the section
+//! in each step and does not depend on it. The stress of the column pushes on the section, and dashpots
+//! between the two absorb waves that leave the section.
 //!
-//! The push is what the section's own force operator would feel of soil beyond the side under the column's stress: the
-//! weights of stencils completed by columns beyond the side, less those of the cut ones. Strain is treated alike: the cut
-//! stencils see the difference to the column's motion, the completed ones the column's. A section that does as the column
-//! does is then held exactly as the column is, corners included, and neither coupling answers to what the section does
-//! otherwise: that is left to the dashpots (Eq. 15 as corrected).
+//! The push is the force of soil beyond the side under the column's stress, computed by the section's force
+//! operator: the weights of complete stencils, which contain columns beyond the side, minus the weights of
+//! stencils cut at the side. Strain is computed in the same way: complete stencils act on the column's
+//! motion, cut stencils on the difference of the section's motion from it. A section that moves as the column
+//! therefore has exactly its strain and its forces, also at the corners. Neither part responds to other
+//! motion of the section; only the dashpots do (Eq. 15 as corrected).
 
 use crate::{
     edges::{
@@ -35,8 +37,9 @@ use crate::{
 use sandboil_sph::{Csr, Period, Vec2};
 use std::collections::BTreeMap;
 
-/// Relative difference up to which two columns' stresses are the same: they are computed, not read.
+/// Relative difference up to which values of two columns count as equal; the values are computed and have round-off.
 const SAME: f64 = 1e-9;
+
 /// Columns beyond the sides of a section and their coupling with it.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct FreeField {
@@ -44,25 +47,26 @@ pub struct FreeField {
     sides: Vec<CoupledSide>,
 }
 
-/// What acts on the section at one side.
+/// Push and dashpots at one side of the section.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 struct CoupledSide {
     hand: Hand,
-    /// Where the side stands when shaking begins, m.
+    /// Position of the side at the start of the first moving stage, m.
     x: f64,
     column: usize,
     dashpots: Dashpots,
-    /// Weights of the column's rows in the motion that the dashpots' points would have with it.
+    /// Weights of the column's rows in its motion at the points of the dashpots.
     trace: Csr<f64>,
     tables: SideTables,
-    /// Nominal stress and pore pressure of the column when increments began, kPa.
+    /// Nominal stress of the column at which the push is zero, kPa.
     reference: Vec<[f64; 4]>,
+    /// Nominal pore pressure of the column at which the push is zero, kPa.
     reference_water: Vec<[f64; 4]>,
-    /// Velocities towards which the dashpots pull, m/s.
+    /// Velocities of the column at the dashpots, m/s.
     targets: Vec<f64>,
     /// Force of the step on the nodes of the tables, kN/m.
     force: Vec<Vec2>,
-    /// Stress nodes that see the column's motion.
+    /// Stress nodes whose strain depends on the column's motion.
     strained: Vec<usize>,
 }
 
@@ -77,7 +81,7 @@ impl FreeField {
         self.columns.iter().filter_map(Column::simulation)
     }
 
-    /// Builds the coupling at the present place; pushes count from here.
+    /// Builds the coupling at the present positions. The push is then zero.
     fn renew_tables(&mut self, section: &SectionView) {
         for side in &mut self.sides {
             let column = &self.columns[side.column];
@@ -87,7 +91,7 @@ impl FreeField {
         }
     }
 
-    /// Copies the columns' motion to where the section's strain reads it.
+    /// Copies the columns' motion to the entries that the section's strain reads.
     fn copy_motion(&self, velocity: &mut [Vec2], acceleration: &mut [Vec2]) {
         let copied = self.sides.iter().flat_map(|side| {
             let present = self.columns[side.column].present();
@@ -151,7 +155,7 @@ impl Neighbour for FreeField {
         Ok(Some(free_field))
     }
 
-    /// Columns are shaken by the wave that arrives at their side.
+    /// Each column is shaken by the wave that arrives at its side.
     fn begin(&mut self, section: &SectionView, stage: &Stage) -> Result<(), SolverError> {
         let lowest = section.model.outline.lowest();
         let mut begun = vec![false; self.columns.len()];
@@ -205,7 +209,7 @@ impl Neighbour for FreeField {
         }
     }
 
-    /// The traction of the columns' bases is no part of it: it passes.
+    /// The traction of the columns' bases is left out, because it lasts only as long as the motion.
     fn add_push(&mut self, force: &mut [Vec2]) {
         for column in &mut self.columns {
             column.observe();
@@ -226,7 +230,7 @@ impl Neighbour for FreeField {
         self.solved().map(|column| column.limit(coupling, factor)).reduce(TimeLimit::least)
     }
 
-    /// Equal columns give their record once for both sides.
+    /// Sides that share a column have copies of one record.
     fn take_records(&mut self) -> [Option<ColumnRecord>; 2] {
         let taken: Vec<Option<ColumnRecord>> = self.columns.iter_mut().map(Column::take_record).collect();
         let mut records = [None, None];
@@ -272,12 +276,12 @@ impl Neighbour for FreeField {
         }
     }
 
-    /// The dashpots pull towards the columns' motion.
+    /// The dashpots act on the difference of the section's motion from the columns'.
     fn end_step(&mut self, dt: f64, mass: &[f64], motion: &mut NodalMotion) {
         for side in &mut self.sides {
             let present = self.columns[side.column].present();
             let CoupledSide { dashpots, trace, targets, .. } = side;
-            // The column's motion as the section's own trace would read it.
+            // The column's motion, interpolated by the section's trace.
             for (target, dashpot) in targets.iter_mut().zip(dashpots.all()) {
                 let read = |(row, weight): (usize, &f64)| {
                     let twice = present.velocity[row] + present.velocity_before[row];
@@ -290,8 +294,8 @@ impl Neighbour for FreeField {
         self.copy_motion(&mut motion.velocity[mass.len()..], &mut motion.acceleration[mass.len()..]);
     }
 
-    /// The work of pushes and dashpots, and that of the section's stress in the strain that the copied velocities give it,
-    /// from which no force comes back.
+    /// Work of pushes and dashpots, and of the section's stress in the strain from the copied velocities, which has no
+    /// counterpart in the nodal forces.
     fn work(
         &self,
         dt: f64,
@@ -316,7 +320,7 @@ impl Neighbour for FreeField {
         self.sides.iter().map(of_side).sum()
     }
 
-    /// Columns included.
+    /// Includes the columns.
     fn bytes(&self) -> usize {
         let side = |side: &CoupledSide| {
             side.dashpots.bytes()
@@ -331,7 +335,7 @@ impl Neighbour for FreeField {
     }
 }
 
-/// Rows of the column as copied velocities from index `first` on.
+/// The same weights with indices of copied velocities, which begin at `first`, instead of rows.
 fn renumbered<T>(mut rows: BTreeMap<usize, Vec<(u32, T)>>, first: u32) -> BTreeMap<usize, Vec<(u32, T)>> {
     for (column, _) in rows.values_mut().flatten() {
         *column += first;
@@ -339,7 +343,7 @@ fn renumbered<T>(mut rows: BTreeMap<usize, Vec<(u32, T)>>, first: u32) -> BTreeM
     rows
 }
 
-/// An error of a column, told with the first side that it belongs to.
+/// The error of a column, with the first side that it belongs to.
 fn of_column(sides: &[CoupledSide], column: usize, error: SolverError) -> SolverError {
     match sides.iter().find(|side| side.column == column) {
         Some(side) => on_side(side.hand, side.x, error),
@@ -347,22 +351,22 @@ fn of_column(sides: &[CoupledSide], column: usize, error: SolverError) -> Solver
     }
 }
 
-/// An error of the column at a side, told with its place.
+/// The error of the column at a side, with the position of the side.
 fn on_side(hand: Hand, x: f64, mut error: SolverError) -> SolverError {
-    if let SolverError::Diverged { x: told, .. } = &mut error {
-        *told = x;
+    if let SolverError::Diverged { x: position, .. } = &mut error {
+        *position = x;
     }
     SolverError::Column { side: hand.name(), source: Box::new(error) }
 }
 
 impl CoupledSide {
-    /// Lets pushes count from what the column now is.
+    /// Makes the push zero in the present state of the column.
     fn begin_increments(&mut self, column: &Column) {
         self.reference.clone_from(&column.present().stress);
         self.reference_water.clone_from(&column.present().water);
     }
 
-    /// Force of the increments of the column's stress and pressure on the section (Eq. 6 beyond the side).
+    /// Computes the force of the increments of the column's stress and pressure on the section (Eq. 6 beyond the side).
     fn push(&mut self, present: &Present) {
         for (row, force) in self.force.iter_mut().enumerate() {
             *force = Vec2::zeros();
@@ -381,10 +385,10 @@ fn difference(a: &[f64; 4], b: &[f64; 4]) -> [f64; 4] {
     [0, 1, 2, 3].map(|c| a[c] - b[c])
 }
 
-/// The soil at a side as a column between periodic sides.
+/// Model of the soil at a side as a column between periodic sides.
 pub fn column_model(model: &Model, edges: &EdgeNodes, hand: Hand) -> Model {
     let nodes = &edges.sides[hand as usize];
-    // The column starts where the section did: its rest is found on the undeformed lattice.
+    // The static stage of the column needs the undeformed lattice, as that of the section.
     let x = nodes.first().map_or(0.0, |&node| model.position[node].x);
     let pick = |values: &[f64]| nodes.iter().filter_map(|&node| values.get(node).copied()).collect();
     let middle = 0.5 * model.spacing.x;
@@ -408,7 +412,7 @@ pub fn column_model(model: &Model, edges: &EdgeNodes, hand: Hand) -> Model {
     }
 }
 
-/// Whether two columns are made of the same rows.
+/// Whether two columns have the same rows.
 fn same_column(a: &Model, b: &Model) -> bool {
     let close = |a: &[f64], b: &[f64]| {
         a.len() == b.len()
@@ -425,8 +429,8 @@ fn same_column(a: &Model, b: &Model) -> bool {
         && close(&[a.outline.base_elevation(0.0)], &[b.outline.base_elevation(0.0)])
 }
 
-/// A dashpot across and one along the side for each of its rows, of the column's small-strain speeds, and the trace at
-/// their points over the rows of the column.
+/// A dashpot normal and one parallel to the side for each of its rows, from the column's small-strain speeds,
+/// and the trace at their points in terms of the rows of the column.
 fn side_dashpots(
     section: &SectionView,
     hand: Hand,

@@ -1,4 +1,4 @@
-//! The identity of a free-field column: everything that its motion in a stage depends on.
+//! Identity of a free-field column: all input on which its motion in a stage depends.
 
 use crate::{
     error::{SolverError, StateError},
@@ -7,8 +7,9 @@ use crate::{
     stages::{gravity::Gravity, stage::Stage},
 };
 
-/// Identities of the columns of the left and the right side in a stage, where these are free-field sides: equal bytes mean
-/// equal motion, whatever stands between the sides. `gravity` is the static stage before, if there is one.
+/// Identities of the columns of the left and the right side in a stage, for free-field sides. Columns with
+/// equal bytes have the same motion, also in different sections. `gravity` is the static stage before, if
+/// there is one.
 ///
 /// # Errors
 /// A description that cannot be written as bytes.
@@ -29,12 +30,13 @@ pub fn column_identities(
         let column = with_own_regions(column_model(&model, &edges, hand));
         let of_column = stage.of_column(segment_at(&stage, side.x), model.outline.lowest());
         let bytes = postcard::to_stdvec(&(column, gravity, of_column));
-        identities[hand as usize] = Some(bytes.map_err(|_| StateError::Damaged("a column has no bytes"))?);
+        identities[hand as usize] =
+            Some(bytes.map_err(|_| StateError::Damaged("the description of a column cannot be written"))?);
     }
     Ok(identities)
 }
 
-/// The model without the regions that none of its nodes belongs to.
+/// The model without the regions that have no nodes in it.
 fn with_own_regions(model: Model) -> Model {
     let mut used: Vec<u32> = model.region.clone();
     used.sort_unstable();

@@ -1,4 +1,4 @@
-//! Ground beside a section that acts on it: free-field columns.
+//! Free-field columns: ground beside a section, which acts on the section.
 
 pub mod column;
 pub mod free_field;

@@ -1,5 +1,5 @@
-//! Weights of a free-field column in the force and strain of the section beside it: those of stencils completed by the
-//! column beyond the side, less those of the cut ones.
+//! Weights of a free-field column in the force and strain of the section beside it: the weights of complete
+//! stencils, which contain the column beyond the side, minus the weights of stencils cut at the side.
 
 use crate::{
     section::{
@@ -18,7 +18,7 @@ use crate::{
 use sandboil_sph::{Csr, LeastSquaresFit, NeighbourList, Vec2, WendlandQuintic};
 use std::collections::BTreeMap;
 
-/// Difference of a completed and a cut weight that is round-off, over the inverse of the spacing.
+/// Difference of the weights of a complete and a cut stencil that is still round-off, times the spacing.
 pub const NO_DIFFERENCE: f64 = 1e-12;
 
 /// Weights of the column's stress, pressure and base traction in the force on nodes near a side.
@@ -30,16 +30,16 @@ pub struct SideTables {
     pub stress: Csr<VectorWeight>,
     /// Volume times weight: rows are `nodes`, columns the column's rows; empty without water.
     pub pressure: Csr<Vec2>,
-    /// Length of base whose traction the cut trace misses, m.
+    /// Length of base whose traction the trace that is cut at the side leaves out, m.
     pub base: Vec<f64>,
-    /// Weights of the column's velocities in the section's strain, for each stress node near the side; columns are rows
-    /// of the column. The section's geometry takes them over.
+    /// Weights of the column's velocities in the section's strain, for each stress node near the side, with
+    /// indices of rows of the column. They are moved to the section's geometry.
     pub strain: BTreeMap<usize, Vec<(u32, VectorWeight)>>,
-    /// The same in the divergence at nodes.
+    /// Weights of the same velocities in the divergence at nodes.
     pub divergence: BTreeMap<usize, Vec<(u32, Vec2)>>,
 }
 
-/// Rows of the column at a side, by their elevation on the undeformed lattice.
+/// Rows of the column at a side, found by their elevation on the undeformed lattice.
 pub struct Rows {
     lowest: f64,
     spacing: f64,
@@ -47,7 +47,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Those beside a side.
+    /// The rows at a side.
     pub fn of(section: &SectionView, hand: Hand) -> Self {
         let side = &section.edges.sides[hand as usize];
         let lowest = side.first().map_or(0.0, |&node| section.model.position[node].y);
@@ -58,14 +58,14 @@ impl Rows {
         ((y - self.lowest) / self.spacing).round()
     }
 
-    /// The row at an elevation, or the column's end for what stands higher or lower.
+    /// The row at an elevation (m); above or below the column its last or first row.
     pub fn nearest(&self, y: f64) -> usize {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to the rows
         let row = self.height(y).clamp(0.0, self.last as f64) as usize;
         row
     }
 
-    /// The row at an elevation, if the column has one.
+    /// The row at an elevation (m), if the column has one.
     fn at(&self, y: f64) -> Option<usize> {
         let row = self.nearest(y);
         (self.height(y) == row as f64).then_some(row)
@@ -81,7 +81,7 @@ impl SideTables {
             + self.pressure.bytes()
     }
 
-    /// Tables of the section as it stands.
+    /// Tables for the present positions of the section.
     pub fn new(section: &SectionView, hand: Hand) -> Self {
         match section.model.numerics.operators {
             Operators::Conservative => Self::completed(section, hand),
@@ -104,7 +104,7 @@ impl SideTables {
         Self { base: vec![0.0; nodes.len()], stress, pressure, nodes, ..Self::default() }
     }
 
-    /// Weights of stencils completed by the column beyond the side, less those of the cut ones.
+    /// Weights of complete stencils minus those of stencils cut at the side.
     fn completed(section: &SectionView, hand: Hand) -> Self {
         let model = section.model;
         let strip = Strip::new(section, hand);
@@ -140,7 +140,7 @@ impl SideTables {
             if node < strip.local.len() {
                 take(&cut_stencils, &in_cut, -1.0);
             }
-            // Seen from here the column's soil stands on both sides: nodes of its rows move as it does.
+            // In these weights every node moves as the row of the column at its height.
             let near = weights.values().any(|weight| weight.magnitude() > negligible);
             if node < strip.local.len() && near {
                 let rows =
@@ -200,16 +200,16 @@ impl SideTables {
     }
 }
 
-/// The nodes near a side, and beyond it the column again and again, as far as stencils reach.
+/// The nodes near a side, and copies of the column beyond it, as far as stencils reach.
 struct Strip {
     /// Nodes of the section near the side.
     local: Vec<usize>,
-    /// Their positions, then those of the repeated column, m.
+    /// Positions of these nodes, then of the copies of the column, m.
     position: Vec<Vec2>,
     volume: Vec<f64>,
-    /// Row of the column at the height of each; none beside a slope that stands higher.
+    /// Row of the column at the height of each node; `None` above and below the column.
     row: Vec<Option<usize>>,
-    /// The same, with the column's end for what stands higher or lower.
+    /// The same, with the last row above the column and the first row below it.
     row_or_end: Vec<usize>,
 }
 
@@ -231,7 +231,7 @@ impl Strip {
             row_or_end: local.iter().map(|&node| rows.nearest(model.position[node].y)).collect(),
             local,
         };
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a handful of columns
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // small and positive
         let repeats = (reach / model.spacing.x).ceil() as usize + 1;
         for repeat in 1..=repeats {
             for (row, &node) in side.iter().enumerate() {
@@ -244,14 +244,14 @@ impl Strip {
         strip
     }
 
-    /// The first `count` nodes and their images.
+    /// The first `count` nodes with their images.
     fn around(&self, section: &SectionView, outline: &Outline, count: usize) -> Surroundings {
         let reach = WendlandQuintic::new(section.model.smoothing_length()).support();
         Surroundings::new(&self.position[..count], outline, section.walls, reach)
     }
 
-    /// Length of base, m, whose traction acts on each node of the strip through a completed trace, less that of the cut
-    /// one.
+    /// Length of base, m, whose traction acts on each node of the strip through a complete trace, minus the
+    /// length through the trace that is cut at the side.
     fn base_lengths(&self, section: &SectionView, hand: Hand, kernel: WendlandQuintic) -> Vec<f64> {
         let mut lengths = vec![0.0; self.local.len()];
         let Some(&corner) = section.edges.sides[hand as usize].first() else { return lengths };

@@ -1,4 +1,4 @@
-//! How a stage begins: each choice of its description takes effect in a part of its own.
+//! Start of a stage: one function for each choice of its description.
 
 use crate::{
     edges::{
@@ -39,14 +39,15 @@ use crate::{
 };
 use sandboil_sph::Vec2;
 
-/// Implicit diffusion is chosen where it lengthens the step by more than this.
+/// Implicit diffusion is chosen if it lengthens the time step by more than this factor.
 const IMPLICIT_GAIN: f64 = 1.2;
-/// Largest conductivity for the acceleration term of Eq. 7 when it is left to us, m/s: above, it limits dt.
+/// Largest conductivity with the acceleration term of Eq. 7 if the numerics leave the choice to the solver,
+/// m/s; above it the term limits the time step.
 pub const ACCELERATION_TERM_CONDUCTIVITY: f64 = 3e-3;
 
-/// What a stage finds of the one before.
+/// The stage before.
 struct Before<N> {
-    /// Whether the ground moved: then soil, water and motion keep their state.
+    /// Whether it was a stage of moving ground; soil, water and motion then keep their state.
     moved: bool,
     neighbour: Option<N>,
 }
@@ -54,14 +55,15 @@ struct Before<N> {
 impl<N: Neighbour> Driver<N> {
     /// Begins a stage.
     ///
-    /// Static stages make soil elastic, freeze pore pressure and hold all edges. In the first stage of moving ground soils
-    /// take their own models from the stress that is there, and constant forces balance the state, so that nothing moves
-    /// until a wave arrives; a further one continues with soil, water and motion as they are, and only strains, envelopes and
-    /// the base's impedance begin again. With large displacements weight and still water act where the ground is.
+    /// In a static stage soil is elastic, pore pressure is frozen and all edges are held. The first stage of
+    /// moving ground starts the soil models from the present stress, and constant forces balance the state,
+    /// so that nothing moves before a wave arrives. A later stage of moving ground keeps soil, water and
+    /// motion; only strains, envelopes and the impedance of the base start from the present state. With large
+    /// displacements weight and still water act at the present positions.
     ///
     /// # Errors
-    /// Choices that exclude each other, values outside their range, a soil model that refuses the stress it is given, or a
-    /// stage after one of large displacements.
+    /// Choices that exclude each other, values outside their range, a soil model that refuses its stress, or
+    /// a stage of moving ground after one of large displacements.
     pub fn begin(&mut self, stage: impl Into<Stage>) -> Result<(), SolverError> {
         let stage = stage.into();
         stage.validate()?;
@@ -79,7 +81,7 @@ impl<N: Neighbour> Driver<N> {
     fn begin_statics(&mut self, stage: &Stage, relaxing: Relaxing) -> Result<(), SolverError> {
         let domain = &mut self.domain;
         domain.counters = Counters::default();
-        // Statics know no waves, and held edges bring back the geometry and masses of the drawn section.
+        // A static stage has no waves, and its held edges have the geometry and masses of the model.
         domain.inertia = None;
         domain.damping = ActiveDamping::default();
         let Ground { placement, water, sharpness, free_surface, .. } = &mut domain.ground;
@@ -101,7 +103,7 @@ impl<N: Neighbour> Driver<N> {
         if self.domain.ground.sharpness.is_some() {
             return Err(SolverError::Order {
                 call: "begin",
-                needs: "ground without large displacements in the stage before",
+                needs: "a stage before without large displacements",
             });
         }
         let mut before = match std::mem::replace(&mut self.active, Active::None) {
@@ -119,7 +121,7 @@ impl<N: Neighbour> Driver<N> {
         domain.ground.restart_strain();
         let base = stage.compliant_base().map(|base| domain.new_base(base)).transpose()?;
         let neighbour = domain.new_neighbour(&stage, before.neighbour, self.gravity)?;
-        // The columns hold their own records.
+        // The columns have copied their records.
         stage.forget_column_records();
         let coupling = domain.begin_pore_pressure(&stage)?;
         let limit = shared_limit(domain, neighbour.as_ref(), coupling, stage.time_step_factor);
@@ -137,24 +139,24 @@ impl<N: Neighbour> Driver<N> {
         Ok(())
     }
 
-    /// Gives the section an excess pore pressure (kPa, user's node order) before the first step of a moving stage, held
-    /// in balance by a load that stays: the start of consolidation under a load just put on.
+    /// Sets an excess pore pressure (kPa, user's node order) before the first step of a stage of moving
+    /// ground. Constant forces balance it: the start of consolidation under a new load.
     ///
     /// # Errors
-    /// A dry section, a stage that has begun to move or has large displacements, or an array of the wrong length.
+    /// A dry section, a stage that has made a step or has large displacements, or an array of the wrong length.
     pub fn set_excess_pore_pressure(&mut self, excess: &[f64]) -> Result<(), SolverError> {
         let (found, expected) = (excess.len(), self.domain.ground.nodes());
         if found != expected {
             return Err(SolverError::Shape { name: "excess_pore_pressure", found, expected });
         }
         let Domain { ground, clock, .. } = &mut self.domain;
-        // Ground with large displacements has no load that stays.
+        // With large displacements there are no constant forces.
         let (Active::Moving(stage), 0, Some(flow), None) =
             (&mut self.active, clock.step, &mut ground.water, ground.sharpness)
         else {
             return Err(SolverError::Order {
                 call: "set_excess_pore_pressure",
-                needs: "water and a shaking stage that has just begun",
+                needs: "water and a shaking stage before its first step",
             });
         };
         flow.set_excess(|own| {
@@ -169,10 +171,11 @@ impl<N: Neighbour> Driver<N> {
         Ok(())
     }
 
-    /// Gives the section a velocity field (m/s, user's node order) before the first step of a moving stage: waves under way.
+    /// Sets the velocities (m/s, user's node order) before the first step of a stage of moving ground, to
+    /// start with waves in the ground.
     ///
     /// # Errors
-    /// A stage that has begun to move, or an array of the wrong length.
+    /// A stage that has made a step, or an array of the wrong length.
     pub fn set_velocity(&mut self, velocity: &[[f64; 2]]) -> Result<(), SolverError> {
         let Domain { ground, clock, .. } = &mut self.domain;
         let (found, expected) = (velocity.len(), ground.nodes());
@@ -182,7 +185,7 @@ impl<N: Neighbour> Driver<N> {
         let (Active::Moving(_), 0) = (&self.active, clock.step) else {
             return Err(SolverError::Order {
                 call: "set_velocity",
-                needs: "a shaking stage that has just begun",
+                needs: "a stage of moving ground before its first step",
             });
         };
         for (slot, &user) in ground.velocity.iter_mut().zip(&ground.order) {
@@ -203,7 +206,7 @@ impl Domain {
         };
     }
 
-    /// Contacts stay those of the first stage of moving ground.
+    /// Keeps the contacts of the first stage of moving ground.
     fn begin_inertia(&mut self) {
         let Ground { model, points, .. } = &self.ground;
         let contacts = self.inertia.take().and_then(|before| before.contacts);
@@ -213,7 +216,7 @@ impl Domain {
             .then(|| CorrectedInertia { dispersion: Dispersion::new(model, points.len()), contacts });
     }
 
-    /// Base and sides: held where they are, free to move, or as free as they are already.
+    /// Places base and sides: held at their present position, free to move, or unchanged since the stage before.
     fn place_edges(&mut self, stage: &Stage, before: &mut Before<impl Neighbour>) {
         match stage.displacements {
             Displacements::Large => {
@@ -240,7 +243,7 @@ impl Domain {
         }
     }
 
-    /// Holds base and sides as in statics where they are now, and takes open sides away.
+    /// Holds base and sides at their present position as in a static stage, and removes open sides.
     fn hold_edges(&mut self, stage: &Stage) {
         let present = self.ground.outline();
         let [left, right] = stage.open();
@@ -252,14 +255,14 @@ impl Domain {
         ground.placement = Placement::Held(outline);
         ground.sharpness = Some(Sharpness::new(&ground.model));
         ground.free_surface = (stage.surface == Surface::Found).then(Vec::new);
-        // Pore pressure begins again, from what it was.
+        // The pore pressure of the stage starts from the present one.
         let water = ground.water.take();
         self.rebuild_geometry();
         self.ground.water = water;
         self.refresh_present_shares();
     }
 
-    /// Soils take their own models from the stress that is there, and the ground is at rest.
+    /// Starts the soil models from the present stress, with the ground at rest.
     fn begin_soils(&mut self) -> Result<(), SolverError> {
         let Ground { model, velocity, acceleration, points, soil, .. } = &mut self.ground;
         velocity.fill(Vec2::zeros());
@@ -284,7 +287,7 @@ impl Domain {
         Ok(base)
     }
 
-    /// The ground beside the section, coupled with it.
+    /// Starts the ground beside the section and couples it with the section.
     fn new_neighbour<N: Neighbour>(
         &mut self,
         stage: &Stage,
@@ -303,7 +306,7 @@ impl Domain {
         Ok(Some(neighbour))
     }
 
-    /// Pore pressure of the stage, from the excess that is there.
+    /// Starts the pore pressure of the stage from the present excess.
     fn begin_pore_pressure(&mut self, stage: &Stage) -> Result<PressureCoupling, SolverError> {
         let scheme = self.flow_scheme(stage.time_step_factor);
         let before = self.ground.water.take();
@@ -329,8 +332,8 @@ impl Domain {
         })
     }
 
-    /// Puts the ground, with the pore water that it had `before`, into still water with its surface at `line`, or as it was
-    /// at rest.
+    /// Starts `flow` in still water with its surface at `line`, or with the water surface of the static
+    /// stage, from the pore water of the stage `before`.
     fn stand_in_water(
         &self,
         flow: &mut Flow,
@@ -358,7 +361,7 @@ impl Domain {
         Ok(())
     }
 
-    /// How pore pressure is advanced: as the numerics say, or with the longer step.
+    /// Scheme of the pore pressure: as the numerics prescribe, or the one with the longer time step.
     fn flow_scheme(&self, factor: f64) -> FlowScheme {
         let Model { numerics, regions, .. } = &self.ground.model;
         let conductivity = regions.iter().map(|r| r.hydraulic_conductivity.major).fold(0.0, f64::max);

@@ -2,25 +2,26 @@
 
 use crate::{edges::base::Impedance, error::SolverError, section::description::STRESS_NODES};
 
-/// Components of a nominal stress or pressure.
+/// Number of components of a nominal stress or pressure.
 pub const COMPONENTS: usize = 4;
 
-/// What a column did in a stage, to be read again by a section with the same column under the same motion.
+/// Motion, stress and pore pressure of a column in a stage. A section with the same column under the same motion reads
+/// the record instead of solving the column.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ColumnRecord {
-    /// Time between frames, s, the first at the stage's beginning; straight between them.
+    /// Time between frames, s; the first frame is at the start of the stage. Values between frames are linear.
     pub interval: f64,
-    /// Density and small-strain wave speeds of every row from below, when the stage began.
+    /// Density and small-strain wave speeds of each row from below, at the start of the stage.
     pub impedance: Vec<Impedance>,
-    /// Whether pore pressure is among the values.
+    /// Whether the values contain pore pressure.
     pub wet: bool,
-    /// Frame after frame: increments of nominal stress of every stress node, of nominal pore pressure and velocity of
-    /// every row, and the base's traction.
+    /// For each frame: increments of the nominal stress of each stress node and of the nominal pore pressure
+    /// of each row (kPa), the velocity of each row (m/s), and the traction of the base (kPa).
     pub values: Vec<f64>,
 }
 
 impl ColumnRecord {
-    /// Values of a frame of a column of `rows` rows.
+    /// Number of values in a frame of a column of `rows` rows.
     pub fn width(rows: usize, wet: bool) -> usize {
         let per_row = STRESS_NODES * COMPONENTS + if wet { COMPONENTS } else { 0 } + 2;
         per_row * rows + 2
@@ -31,10 +32,10 @@ impl ColumnRecord {
         self.impedance.len()
     }
 
-    /// Refuses what is no record of a column of `rows` rows over `duration` s.
+    /// Refuses a record that is not of a column of `rows` rows, or is shorter than `duration` (s).
     ///
     /// # Errors
-    /// The first of its figures that does not fit.
+    /// The first value that does not fit.
     pub fn validate(&self, rows: usize, wet: bool, duration: f64) -> Result<(), SolverError> {
         if self.rows() != rows || self.wet != wet {
             let (found, expected) = (self.rows(), rows);
@@ -45,7 +46,7 @@ impl ColumnRecord {
         let covered = self.interval * frames.saturating_sub(1) as f64;
         if !self.values.len().is_multiple_of(width) || !(covered >= duration) {
             let (name, value) = ("column_record", covered);
-            return Err(SolverError::InvalidInput { name, value, expected: "as long as the stage, in s" });
+            return Err(SolverError::InvalidInput { name, value, expected: "as long as the stage, s" });
         }
         if let Some(&value) = self.values.iter().find(|value| !value.is_finite()) {
             return Err(SolverError::InvalidInput { name: "column_record", value, expected: "finite" });
@@ -53,7 +54,7 @@ impl ColumnRecord {
         Ok(())
     }
 
-    /// Values of a frame at any time, held after the last one.
+    /// Values at a time (s), linear between frames; after the last frame those of the last.
     pub fn at(&self, time: f64, into: &mut [f64]) {
         let width = into.len();
         let place = (time / self.interval).max(0.0);

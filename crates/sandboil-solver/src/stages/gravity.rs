@@ -4,15 +4,15 @@ use crate::stages::stage::{
     BaseEdge, Damping, Displacements, Edges, End, Output, SideEdge, Stage, Surface, WaterReference,
 };
 
-/// Time-step factor of the stage: kinetic damping needs no margin for stiffening.
+/// Time-step factor of the stage. It needs no margin for stiffening, because soil is elastic.
 const TIME_STEP_FACTOR: f64 = 0.85;
 
 /// Static stage: gravity on held edges, relaxed by kinetic damping; soil elastic, pore pressure frozen.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Gravity {
-    /// Largest unbalanced acceleration over gravity at the end.
+    /// Largest unbalanced acceleration over gravity at which the ground is at rest.
     pub tolerance: f64,
-    /// Steps after which the stage gives up.
+    /// Number of steps after which the stage ends with an error.
     pub max_steps: u64,
 }
 

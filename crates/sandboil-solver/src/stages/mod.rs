@@ -1,4 +1,4 @@
-//! Description of a stage, its presets, and the table of choices that exclude each other.
+//! Description of a stage, its presets gravity, shaking and run-out, and the table of choices that exclude each other.
 
 pub mod column_record;
 pub mod gravity;

@@ -1,4 +1,4 @@
-//! One table of the choices of a scene that exclude each other.
+//! Table of the choices of a scene that exclude each other.
 
 use crate::{
     error::SolverError,
@@ -6,9 +6,9 @@ use crate::{
     stages::stage::{Displacements, Stage, WaterReference},
 };
 
-/// The choices that a rule looks at.
+/// The choices to which the rules apply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[allow(clippy::struct_excessive_bools)] // each is a choice of its own
+#[allow(clippy::struct_excessive_bools)] // the choices are independent
 pub struct Choices {
     /// The printed operators.
     pub printed_operators: bool,
@@ -20,7 +20,7 @@ pub struct Choices {
     pub periodic_sides: bool,
     /// A free-field side.
     pub free_field: bool,
-    /// A side that is taken away.
+    /// A side that is removed.
     pub open_sides: bool,
     /// Rayleigh damping.
     pub rayleigh_damping: bool,
@@ -28,12 +28,12 @@ pub struct Choices {
     pub large_displacements: bool,
     /// Hydraulic conditions while the ground moves.
     pub hydraulic_conditions: bool,
-    /// Still water given by its surface.
+    /// Still water with a given surface.
     pub still_water: bool,
 }
 
 impl Choices {
-    /// Those of a model, before any stage.
+    /// Choices of a model, without a stage.
     pub fn of_model(model: &Model) -> Self {
         Self {
             printed_operators: model.numerics.operators == Operators::Printed,
@@ -44,7 +44,7 @@ impl Choices {
         }
     }
 
-    /// Those of a model in a stage.
+    /// Choices of a model and a stage.
     pub fn of_stage(model: &Model, stage: &Stage) -> Self {
         let line = match &stage.water_reference {
             WaterReference::StillWater { line } => line.as_deref(),
@@ -69,12 +69,12 @@ pub struct Rule {
     pub name: &'static str,
     /// The choice to leave out.
     pub choice: &'static str,
-    /// Why, as a condition on the choice.
+    /// Condition on the choice, with its reason.
     pub expected: &'static str,
     breaks: fn(&Choices) -> bool,
 }
 
-/// All rules, in the order in which they are told.
+/// All rules, in the order in which they are checked.
 pub const RULES: [Rule; 10] = [
     Rule {
         name: "dispersion correction with printed operators",
@@ -91,7 +91,7 @@ pub const RULES: [Rule; 10] = [
     Rule {
         name: "large displacements with dispersion correction",
         choice: "dispersion_correction",
-        expected: "left out with large displacements: contacts of soils do not stay where they are",
+        expected: "left out with large displacements: the contacts of soils move",
         breaks: |c| c.large_displacements && c.dispersion_correction,
     },
     Rule {
@@ -103,13 +103,13 @@ pub const RULES: [Rule; 10] = [
     Rule {
         name: "large displacements with hydraulic conditions",
         choice: "large_displacements",
-        expected: "left out with hydraulic conditions, whose edges would move away",
+        expected: "left out with hydraulic conditions: the edges on which these act would move",
         breaks: |c| c.large_displacements && c.hydraulic_conditions,
     },
     Rule {
         name: "open sides with periodic sides",
         choice: "open_sides",
-        expected: "left out with periodic sides, which are no edges",
+        expected: "left out with periodic sides, which are not edges",
         breaks: |c| c.open_sides && c.periodic_sides,
     },
     Rule {
@@ -127,7 +127,7 @@ pub const RULES: [Rule; 10] = [
     Rule {
         name: "dispersion correction with free field",
         choice: "dispersion_correction",
-        expected: "left out beside free-field sides, whose push is computed with the plain inertia",
+        expected: "left out beside free-field sides, whose columns have the plain inertia",
         breaks: |c| c.dispersion_correction && c.free_field,
     },
     Rule {
@@ -138,7 +138,7 @@ pub const RULES: [Rule; 10] = [
     },
 ];
 
-/// The rules that some choices break, in the order of the table.
+/// Rules that the choices break, in the order of the table.
 pub fn broken(choices: &Choices) -> impl Iterator<Item = &'static Rule> {
     RULES.iter().filter(|rule| (rule.breaks)(choices))
 }
@@ -160,7 +160,7 @@ pub fn check(choices: &Choices) -> Result<(), SolverError> {
 mod tests {
     use super::*;
 
-    /// Every rule is broken by its two choices alone, names are unique, and no choice by itself breaks a rule.
+    /// Each rule has its own name, and no single choice breaks a rule, except still water, which needs water.
     #[test]
     fn each_rule_needs_two_choices() {
         let set: [fn(&mut Choices); 10] = [

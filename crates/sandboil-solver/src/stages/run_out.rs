@@ -5,22 +5,23 @@ use crate::stages::stage::{
 };
 use sandboil_sph::Vec2;
 
-/// Ground that may flow to where it comes to rest.
+/// Stage in which the ground may flow until it comes to rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunOut {
     /// Duration, s.
     pub duration: f64,
     /// Coefficient `alpha` of the artificial viscosity.
     pub viscosity: f64,
-    /// Whether the left and the right side are taken away.
+    /// Whether the left and the right side are removed.
     pub open: [bool; 2],
-    /// Surface of the still water around the ground, from left to right, m; empty: none. `None`: the surface at rest.
+    /// Surface of the still water around the ground, from left to right, m; no water if empty. `None`: the
+    /// water surface of the static stage.
     pub still_water: Option<Vec<Vec2>>,
     /// Local damping `xi_l` of Eq. 16.
     pub local_damping: f64,
-    /// Factor on the stability limit.
+    /// Factor on the stability limit of the time step.
     pub time_step_factor: f64,
-    /// What is recorded.
+    /// Histories and envelopes to record.
     pub output: Output,
 }
 

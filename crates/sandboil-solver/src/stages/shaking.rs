@@ -12,7 +12,7 @@ use crate::{
     water::moving_edges::MovingBoundary,
 };
 
-/// Default time-step factor of moving ground: soil stiffens in cycles between checks.
+/// Default time-step factor of moving ground: a margin, because soil can stiffen between updates of the time step.
 pub const MOVING_FACTOR: f64 = 0.6;
 
 /// Dynamic stage on a compliant base.
@@ -20,21 +20,22 @@ pub const MOVING_FACTOR: f64 = 0.6;
 pub struct Shaking {
     /// Duration, s.
     pub duration: f64,
-    /// The base and the waves that arrive through it.
+    /// The base and the waves that enter through it.
     pub base: Base,
-    /// Whether the left and the right side become free-field sides; else they stay as they are held in statics.
+    /// Whether the left and the right side are free-field sides; otherwise they are held as in the static stage.
     pub free_field: [bool; 2],
-    /// Records of the columns of the left and the right side under the same motion, read instead of solving the columns.
+    /// Records of the columns of the left and the right side under the same motion; a column with a record is
+    /// not solved.
     pub column_records: [Option<ColumnRecord>; 2],
     /// Local damping `xi_l` of Eq. 16.
     pub local_damping: f64,
     /// Rayleigh damping, if any.
     pub rayleigh: Option<Rayleigh>,
-    /// Hydraulic conditions. Without one the ground surface keeps its pressure, and all other edges are impermeable.
+    /// Hydraulic conditions. An edge without one is impermeable, except the ground surface, which keeps its pressure.
     pub conditions: Vec<MovingBoundary>,
-    /// Factor on the stability limit.
+    /// Factor on the stability limit of the time step.
     pub time_step_factor: f64,
-    /// What is recorded.
+    /// Histories and envelopes to record.
     pub output: Output,
 }
 

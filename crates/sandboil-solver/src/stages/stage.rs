@@ -1,4 +1,5 @@
-//! A stage: independent choices of what is done to a section. Gravity, shaking and run-out are presets of it.
+//! Description of a stage: independent choices of edges, water, damping and output. Gravity, shaking and run-out are
+//! presets.
 
 use crate::{
     edges::base::{Base, BaseSegment},
@@ -10,26 +11,26 @@ use crate::{
 };
 use sandboil_sph::Vec2;
 
-/// What is done to a section, and what is recorded of it.
+/// Loading, boundaries, damping and output of a stage.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Stage {
     /// Base and sides.
     pub edges: Edges,
-    /// Pore pressure that counts as no excess.
+    /// Pore pressure at which the excess is zero.
     pub water_reference: WaterReference,
-    /// The surface across which pore water drains.
+    /// Surface at which pore water drains.
     pub surface: Surface,
     /// How far the ground may move.
     pub displacements: Displacements,
-    /// What takes energy from the motion beside the soil.
+    /// Damping in addition to that of the soil.
     pub damping: Damping,
-    /// Hydraulic conditions. Without one the ground surface keeps its pressure, and all other edges are impermeable.
+    /// Hydraulic conditions. An edge without one is impermeable, except the ground surface, which keeps its pressure.
     pub conditions: Vec<MovingBoundary>,
     /// When the stage ends.
     pub end: End,
-    /// Factor on the stability limit.
+    /// Factor on the stability limit of the time step.
     pub time_step_factor: f64,
-    /// What is recorded.
+    /// Histories and envelopes to record.
     pub output: Output,
 }
 
@@ -45,7 +46,7 @@ pub struct Edges {
 /// The base in a stage.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum BaseEdge {
-    /// Held as its support says.
+    /// Held as its support prescribes.
     Held,
     /// Compliant: waves pass through it.
     Compliant(Base),
@@ -54,45 +55,47 @@ pub enum BaseEdge {
 /// A side in a stage.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum SideEdge {
-    /// Held as its support says.
+    /// Held as its support prescribes.
     Held,
-    /// Next to a free-field column, which is solved, or read from a record of the same column under the same motion.
+    /// Next to a free-field column. With a record of the same column under the same motion the column is not solved.
     FreeField(Option<ColumnRecord>),
-    /// Taken away.
+    /// Removed.
     Open,
 }
 
-/// Pore pressure that counts as no excess.
+/// Pore pressure at which the excess is zero.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum WaterReference {
-    /// The pressure at rest, which moves with the nodes.
+    /// The pressure of each node at rest; a node keeps it when it moves.
     AtRest,
-    /// The pressure of still water at the present place of each node.
+    /// The pressure of still water at the present position of each node.
     StillWater {
-        /// Surface of the water from left to right, m; empty: there is none. `None`: the surface at rest.
+        /// Surface of the water from left to right, m; no water if empty. `None`: the water surface of the
+        /// static stage.
         line: Option<Vec<Vec2>>,
     },
 }
 
-/// The surface across which pore water drains.
+/// Surface at which pore water drains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Surface {
-    /// That of the section as it was drawn: the nodes below it stay the same.
+    /// The ground surface of the model: the nodes at it stay the same.
     Tied,
-    /// Found from the present places of the nodes.
+    /// Found from the present positions of the nodes.
     Found,
 }
 
 /// How far the ground may move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Displacements {
-    /// Nodes keep their neighbours; a renewed geometry leaves the state in balance.
+    /// Nodes keep their neighbours. After a renewal of the geometry constant forces keep the balance.
     Small,
-    /// Nodes change their neighbours and may fly alone; weight and still water act where the nodes are.
+    /// Nodes change their neighbours and may separate from all others. Weight and still water act at the
+    /// present positions.
     Large,
 }
 
-/// What takes energy from the motion beside the soil.
+/// Damping in addition to that of the soil.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Damping {
     /// Local damping `xi_l` of Eq. 16.
@@ -106,31 +109,31 @@ pub struct Damping {
 /// When a stage ends.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum End {
-    /// When the ground is at rest. Soil is elastic meanwhile, pore pressure frozen, and motion has no physical time.
+    /// When the ground is at rest. Soil is elastic, pore pressure is frozen, and time has no physical meaning.
     AtRest {
-        /// Largest unbalanced acceleration over gravity.
+        /// Largest unbalanced acceleration over gravity at which the ground is at rest.
         tolerance: f64,
-        /// Steps after which the stage gives up.
+        /// Number of steps after which the stage ends with an error.
         max_steps: u64,
     },
-    /// After a time, s.
+    /// After a duration, s.
     After(f64),
 }
 
-/// What a stage records.
+/// Histories and envelopes that a stage records.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Output {
-    /// Points where histories are read, m.
+    /// Points at which histories are recorded, m.
     pub probes: Vec<Vec2>,
     /// Interval of the histories, s.
     pub history_interval: f64,
-    /// Whether probes also read stress and strain.
+    /// Whether stress and strain are also recorded at the probes.
     pub stress_histories: bool,
-    /// Whether the largest excess pressure of every node is kept.
+    /// Whether the largest excess pressure of each node is recorded.
     pub pressure_envelope: bool,
-    /// Whether the largest shear strain of every stress node is kept.
+    /// Whether the largest shear strain of each stress node is recorded.
     pub strain_envelope: bool,
-    /// Interval at which the motion of free-field columns is recorded, s.
+    /// Interval at which free-field columns are recorded, s; `None`: they are not.
     pub record_columns: Option<f64>,
 }
 
@@ -140,7 +143,7 @@ impl Stage {
         self.edges.sides.each_ref().map(|side| matches!(side, SideEdge::FreeField(_)))
     }
 
-    /// Which sides are taken away.
+    /// Which sides are removed.
     pub fn open(&self) -> [bool; 2] {
         self.edges.sides.each_ref().map(|side| matches!(side, SideEdge::Open))
     }
@@ -176,7 +179,7 @@ impl Stage {
         }
     }
 
-    /// Drops the records of columns, once these hold them.
+    /// Drops the records of the columns, after the columns have copied them.
     pub fn forget_column_records(&mut self) {
         for side in &mut self.edges.sides {
             if let SideEdge::FreeField(record) = side {
@@ -185,7 +188,7 @@ impl Stage {
         }
     }
 
-    /// Record of the column of a side, if it is to be read instead of solved.
+    /// Record of the column of a side, if there is one; the column is then not solved.
     pub fn column_record(&self, hand: Hand) -> Option<&ColumnRecord> {
         match &self.edges.sides[hand as usize] {
             SideEdge::FreeField(record) => record.as_ref(),
@@ -193,7 +196,7 @@ impl Stage {
         }
     }
 
-    /// Duration, s; infinite where the ground comes to rest first.
+    /// Duration, s; infinite for a stage that ends at rest.
     pub fn duration(&self) -> f64 {
         match self.end {
             End::After(duration) => duration,
@@ -201,8 +204,8 @@ impl Stage {
         }
     }
 
-    /// The same stage for a column between periodic sides, shaken by the wave of one segment of the base; `lowest` (m) is the
-    /// elevation at which times of arrival hold unless the base says otherwise.
+    /// The same stage for a column between periodic sides, shaken by the wave of one segment of the base.
+    /// `lowest` (m) is the elevation to which arrival times refer if the base has no datum.
     #[must_use]
     pub fn of_column(&self, segment: BaseSegment, lowest: f64) -> Self {
         let base = match &self.edges.base {
