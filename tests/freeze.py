@@ -2,13 +2,14 @@
 
     python tests/freeze.py                         compare, and name every entry that differs
     python tests/freeze.py --write                 freeze all entries, and name those that differed
-    python tests/freeze.py --write 'plan: *'       freeze the entries of such names alone
+    python tests/freeze.py --write 'plan: *'       freeze only the entries with such names
 
-Entries are named `bits: CASE / STAGE / QUANTITY`, and `plan: ...` for sizes and words, which may change while
+Entries are named `bits: CASE / STAGE / QUANTITY`, and `plan: ...` for sizes and texts, which may change while
 the bits stay. `--threads N` computes with so many. Bits change for a reason: commit it with them.
 
 A result can have other bits on another processor or with other libraries, where the functions of
-`frozen/machine.py` round otherwise. The test is then skipped: freeze there with sources that you trust first.
+`frozen/machine.py` round differently. The test is then skipped: first freeze there with sources that you
+trust.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ def of_case(kept: Entries, case: str) -> Entries:
 
 
 def differences(kept: Entries, found: Entries) -> dict[str, str]:
-    """Every entry that differs, with what it was and what it is."""
+    """Every entry that differs, with its value before and now."""
     return {
         name: f"{kept.get(name, 'absent')} before, {found.get(name, 'absent')} now"
         for name in sorted(kept.keys() | found.keys())
@@ -95,7 +96,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     frozen_on, _, kept = read()
     if frozen_on != machine.fingerprint():
-        print("functions round otherwise here than where the bits were frozen (frozen/machine.py)")
+        print("functions round differently here than where the bits were frozen (frozen/machine.py)")
     found: Entries = {}
     for case in CASES:
         with tempfile.TemporaryDirectory() as folder:
@@ -104,15 +105,17 @@ def main(arguments: list[str] | None = None) -> int:
     if options.write is not None:
         patterns = options.write or ["*"]
         changed = {
-            name: told for name, told in changed.items() if any(fnmatchcase(name, p) for p in patterns)
+            name: difference
+            for name, difference in changed.items()
+            if any(fnmatchcase(name, p) for p in patterns)
         }
         for name in changed:
             kept.pop(name, None)
             if name in found:
                 kept[name] = found[name]
         write(kept)
-    for name, told in changed.items():
-        print(f"{name}: {told}")
+    for name, difference in changed.items():
+        print(f"{name}: {difference}")
     print(f"{len(changed)} of {len(found)} entries {'written' if options.write is not None else 'differ'}")
     return 1 if changed and options.write is None else 0
 

@@ -1,4 +1,4 @@
-"""Small scenes that the tests of running share: seconds of wall time, every part of the physics at work."""
+"""Small scenes that the tests of runs share: seconds of wall time, with all parts of the physics."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PULSE = Motion.ricker(frequency=4.0, pga_g=0.3)
 
 def column(**changes: Any) -> Scene:
     """2 m of loose over 2 m of dense sand under water, shaken by a pulse for 0.8 s, with what is changed."""
-    said: dict[str, Any] = {
+    settings: dict[str, Any] = {
         "spacing": 0.25,
         "water": Water(),
         "water_table": WaterTable(depth=0.0),
@@ -37,7 +37,7 @@ def column(**changes: Any) -> Scene:
         "stages": [Gravity(), Shaking(PULSE, duration=0.8)],
         "output": Output(depths=[1.0, 3.0], points=[(0.25, 0.6)], field_dt=0.1),
     }
-    return Scene(**(said | changes))
+    return Scene(**(settings | changes))
 
 
 def dry_column(**changes: Any) -> Scene:

@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 import bad_inputs
 import pytest
 import sandboil as sb
-from bad_inputs import CATALOGUE, SEEPING, SLOPE, SOUND, lasting, said, seeping, to
+from bad_inputs import CATALOGUE, SEEPING, SLOPE, SOUND, as_toml, lasting, seeping, to
 from sandboil import _core
 from sandboil._errors import InvalidInput, SandboilError, SimulationDiverged, nearest_name
 
@@ -24,20 +24,20 @@ def kept() -> dict[tuple[str, str], str]:
     for part in KEPT.read_text(encoding="utf-8").removeprefix("## ").split("\n## "):
         subject, *blocks = part.rstrip("\n").split("\n\n")
         for block in blocks:
-            name, _, told = block.partition("\n")
-            entries[subject, name] = told + "\n"
+            name, _, message = block.partition("\n")
+            entries[subject, name] = message + "\n"
     return entries
 
 
 @pytest.fixture
 def no_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let nothing be computed: no section moves, no water flows, no specimen is strained."""
+    """Make every computation fail the test: of a section, of seepage, and of a specimen."""
 
     def work(*args: Any, **kwargs: Any) -> NoReturn:
         pytest.fail("work began before the input was refused")
 
     class Untested:
-        """A specimen that only stands there."""
+        """A specimen that cannot be tested."""
 
         def __init__(self, *args: Any, **kwargs: Any) -> None:
             self._own = specimen(*args, **kwargs)
@@ -59,26 +59,26 @@ def test_a_bad_input_is_refused_as_it_was_read(
     assert bad_inputs.entry(CATALOGUE[subject][name]) == kept[subject, name]
 
 
-def test_the_file_holds_what_the_catalogue_does(kept: dict[tuple[str, str], str]) -> None:
+def test_the_file_and_the_catalogue_have_the_same_entries(kept: dict[tuple[str, str], str]) -> None:
     assert list(kept) == NAMES
     assert len(NAMES) >= 60
 
 
-def test_every_refusal_says_where_what_and_how_to_mend_it(kept: dict[tuple[str, str], str]) -> None:
+def test_every_refusal_has_place_value_and_remedy(kept: dict[tuple[str, str], str]) -> None:
     lacking = []
-    for name, told in kept.items():
-        rows = dict(line.strip().split(None, 1) for line in told.splitlines() if " " in line.strip())
+    for name, message in kept.items():
+        rows = dict(line.strip().split(None, 1) for line in message.splitlines() if " " in line.strip())
         if set(rows) != {"at", "value", "allowed", "remedy"} or rows["remedy"] == "none":
             lacking.append(name)
     assert not lacking
 
 
 @pytest.mark.parametrize("scene", [SOUND, SEEPING, SLOPE], ids=["level", "seeping", "slope"])
-def test_what_the_slips_spoil_is_sound(scene: dict[str, Any]) -> None:
-    assert sb.Scene.from_toml(said(scene)) == sb.Scene(**scene)
+def test_the_scenes_without_a_change_are_accepted(scene: dict[str, Any]) -> None:
+    assert sb.Scene.from_toml(as_toml(scene)) == sb.Scene(**scene)
 
 
-def test_fluxes_alone_may_run_for_a_while() -> None:
+def test_fluxes_alone_are_allowed_for_a_given_duration() -> None:
     flux = {"kind": "flux", "on": "left", "inflow": 1.0e-6}
     assert lasting(to("stages.0.conditions", [flux]))()
 
@@ -98,7 +98,7 @@ def test_a_drain_below_a_pond_needs_no_retention_curve() -> None:
     assert simulation.field("pore_pressure").min() > 0.0
 
 
-def test_suction_in_soil_without_a_retention_curve_is_told() -> None:
+def test_suction_in_soil_without_a_retention_curve_gives_a_warning() -> None:
     """More is drawn out on the right than the head on the left drives through the ground."""
     drawn = [{"kind": "head", "on": "left", "head": 6.0}, {"kind": "flux", "on": "right", "inflow": -1e-5}]
     full = bad_inputs.without(f"{bad_inputs.SOIL}.retention")
@@ -113,16 +113,16 @@ def test_suction_in_soil_without_a_retention_curve_is_told() -> None:
     assert len(simulation.doubts) == 1
 
 
-def test_a_byte_order_mark_is_no_slip(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_accepted(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
-    path.write_text(said(SOUND), encoding="utf-8-sig")
+    path.write_text(as_toml(SOUND), encoding="utf-8-sig")
     assert sb.Scene.from_toml(path) == sb.Scene(**SOUND)
 
 
-def test_a_value_of_any_size_is_told_in_a_few_lines() -> None:
+def test_a_message_is_short_for_a_value_of_any_size() -> None:
     for value in ("x" * 10**6, list(range(10**6)), {str(k): [k] * 100 for k in range(1000)}):
-        told = str(InvalidInput("a" * 10**5, value, "b" * 10**5, "c" * 10**5))
-        assert 1000 < len(told) < 3000
+        message = str(InvalidInput("a" * 10**5, value, "b" * 10**5, "c" * 10**5))
+        assert 1000 < len(message) < 3000
 
 
 def test_errors_survive_pickling_and_say_what_they_hold() -> None:
@@ -137,7 +137,7 @@ def test_errors_survive_pickling_and_say_what_they_hold() -> None:
     )
 
 
-def test_nearest_name_ignores_case_and_gives_up_on_strangers() -> None:
+def test_nearest_name_ignores_case_and_finds_none_for_unlike_names() -> None:
     names = ["porosity", "void_ratio", "G0"]
     assert nearest_name("Porosty", names) == "porosity"
     assert nearest_name("g0", names) == "G0"

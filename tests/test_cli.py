@@ -29,7 +29,7 @@ def command(*arguments: object) -> list[str]:
 
 
 def sandboil(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """The command in a process of its own, as a user starts it."""
+    """The command in a separate process, as a user starts it."""
     return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=120, check=False)
 
 
@@ -51,7 +51,7 @@ def called(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 
 def refused(*arguments: object) -> str:
-    """What the command says on stderr when it refuses its input: one line, and nothing on stdout."""
+    """The message on stderr of a command that refuses its input: one line, and nothing on stdout."""
     done = called(*arguments)
     assert (done.returncode, done.stdout) == (INVALID, "")
     assert done.stderr.startswith("sandboil: ")
@@ -103,9 +103,9 @@ def test_another_motion_shakes_the_scene(scene_file: Path, record: Path, tmp_pat
 
 
 def test_only_commands_that_work_are_offered() -> None:
-    told = called("--help").stdout
-    assert all(name in told for name in ("plan", "run", "plot", "motion", "lab"))
-    assert not any(name in told for name in ("report", "trade", "study"))
+    page = called("--help").stdout
+    assert all(name in page for name in ("plan", "run", "plot", "motion", "lab"))
+    assert not any(name in page for name in ("report", "trade", "study"))
     assert "--resume" in called("run", "--help").stdout
 
 
@@ -116,9 +116,9 @@ def test_a_misspelt_key_is_refused_with_the_right_one(scene_file: Path, tmp_path
     scene_file.write_text(
         scene_file.read_text().replace("hydraulic_conductivity", "hydraulic_conductivty", 1)
     )
-    for told in (refused("plan", scene_file), refused("run", scene_file, "--out", tmp_path / "out")):
-        assert "scene.regions[0].hydraulic_conductivty" in told
-        assert "did you mean 'hydraulic_conductivity'" in told
+    for message in (refused("plan", scene_file), refused("run", scene_file, "--out", tmp_path / "out")):
+        assert "scene.regions[0].hydraulic_conductivty" in message
+        assert "did you mean 'hydraulic_conductivity'" in message
     assert not (tmp_path / "out").exists()
 
 
@@ -145,7 +145,7 @@ def test_a_motion_that_cannot_be_read_is_refused(scene_file: Path, tmp_path: Pat
 
 
 def test_a_folder_without_results_is_refused(tmp_path: Path) -> None:
-    assert "must hold a results.h5" in refused("plot", tmp_path)
+    assert "must contain a results.h5" in refused("plot", tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -170,13 +170,13 @@ def test_divergence_exits_with_3_and_keeps_results(tmp_path: Path) -> None:
     scenes.diverging_column().to_toml(tmp_path / "scene.toml")
     done = sandboil("run", tmp_path / "scene.toml", "--out", tmp_path / "out")
     assert (done.returncode, done.stdout) == (STOPPED, "")
-    told = done.stderr.replace("\n", " ")
+    message = done.stderr.replace("\n", " ")
     for part in ("diverged", "node", "time", "step", str(tmp_path / "out" / "results.h5")):
-        assert part in told
-    assert "Traceback" not in told
+        assert part in message
+    assert "Traceback" not in message
     results = load(tmp_path / "out")
     assert results.status == "stopped"
-    assert results.message in told
+    assert results.message in message
     assert "stopped" in str(results.summary())
 
 
@@ -193,17 +193,17 @@ def test_a_run_that_cannot_write_exits_with_3_and_resumes(tmp_path: Path, finish
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (180_000, 180_000)),
     )
     assert (limited.returncode, limited.stdout) == (STOPPED, "")
-    told = limited.stderr.replace("\n", " ")
+    message = limited.stderr.replace("\n", " ")
     for part in (
         "could not be written",
         "File too large",
         "is kept: remove the cause and resume",
         "results.h5",
     ):
-        assert part in told
-    assert "Traceback" not in told
+        assert part in message
+    assert "Traceback" not in message
     assert load(out).status == "running"
-    # The newest checkpoint is damaged too: that is told before the run goes on.
+    # The newest checkpoint is damaged too, which is reported before the run continues.
     newest = sorted((out / "checkpoints").glob("0*"))[-1]
     newest.write_bytes(newest.read_bytes()[:-1])
     done = called("run", tmp_path / "scene.toml", "--out", out, "--resume")
@@ -217,8 +217,8 @@ def test_a_run_that_cannot_write_exits_with_3_and_resumes(tmp_path: Path, finish
 
 
 def test_a_folder_without_a_run_is_not_resumed(tmp_path: Path, scene_file: Path) -> None:
-    told = refused("run", scene_file, "--out", tmp_path / "none", "--resume")
-    assert "must hold a run to resume, but has no results.h5" in told
+    message = refused("run", scene_file, "--out", tmp_path / "none", "--resume")
+    assert "must hold a run to resume, but has no results.h5" in message
 
 
 def test_interrupting_exits_with_130_and_leaves_a_readable_file(tmp_path: Path) -> None:
@@ -237,10 +237,10 @@ def test_interrupting_exits_with_130_and_leaves_a_readable_file(tmp_path: Path) 
         assert time.monotonic() < deadline
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
-    _, told = process.communicate(timeout=60)
+    _, message = process.communicate(timeout=60)
     assert process.returncode == INTERRUPTED
-    assert "interrupted in shaking" in told
-    assert "Traceback" not in told
+    assert "interrupted in shaking" in message
+    assert "Traceback" not in message
     results = load(out)
     assert results.status == "interrupted"
     assert np.isfinite(results.field_series("velocity")).all()
@@ -254,12 +254,12 @@ SAND = ("--Dr", 0.55, "--G0", 677, "--hpo", 0.4)
 
 def test_cyclic_shear_counts_cycles(tmp_path: Path) -> None:
     out, picture = tmp_path / "test.csv", tmp_path / "test.png"
-    told = called("lab", "dss", *SAND, "--csr", 0.147, "--out", out, "--plot", picture)
-    assert (told.returncode, told.stderr) == (DONE, "")
+    result = called("lab", "dss", *SAND, "--csr", 0.147, "--out", out, "--plot", picture)
+    assert (result.returncode, result.stderr) == (DONE, "")
     expected = lab.cyclic_dss(PM4Sand(Dr=0.55, G0=677, hpo=0.4), csr=0.147)
-    assert f"{'single amplitude 3 %':<28}{expected.cycles_to(gamma_sa=0.03):>8.2f}\n" in told.stdout
-    assert f"{'double amplitude 5 %':<28}{expected.cycles_to(gamma_da=0.05):>8.2f}\n" in told.stdout
-    assert told.stdout.splitlines()[-1].endswith(expected.ended)
+    assert f"{'single amplitude 3 %':<28}{expected.cycles_to(gamma_sa=0.03):>8.2f}\n" in result.stdout
+    assert f"{'double amplitude 5 %':<28}{expected.cycles_to(gamma_da=0.05):>8.2f}\n" in result.stdout
+    assert result.stdout.splitlines()[-1].endswith(expected.ended)
     header, *rows = out.read_text().splitlines()
     assert header.split(",") == list(expected.columns())
     assert len(rows) == len(expected.gamma)
@@ -267,17 +267,17 @@ def test_cyclic_shear_counts_cycles(tmp_path: Path) -> None:
 
 
 def test_a_criterion_that_is_never_reached_says_so() -> None:
-    told = called("lab", "dss", *SAND, "--csr", 0.05, "--max-cycles", 2)
-    assert told.returncode == DONE
-    assert f"{'r_u 0.95':<28}{'never':>8}\n" in told.stdout
+    result = called("lab", "dss", *SAND, "--csr", 0.05, "--max-cycles", 2)
+    assert result.returncode == DONE
+    assert f"{'r_u 0.95':<28}{'never':>8}\n" in result.stdout
 
 
 def test_monotonic_shear_of_a_soil_in_a_file(tmp_path: Path) -> None:
     soil = tmp_path / "soil.toml"
     soil.write_text('kind = "elastic"\nG = 3.0e4\nK = 9.0e4\n')
-    told = called("lab", "dss", "--soil", soil, "--monotonic", "--drained", "--gamma-max", 0.01)
-    assert told.returncode == DONE
-    assert [line.split()[:2] for line in told.stdout.splitlines()[1:4]] == [
+    result = called("lab", "dss", "--soil", soil, "--monotonic", "--drained", "--gamma-max", 0.01)
+    assert result.returncode == DONE
+    assert [line.split()[:2] for line in result.stdout.splitlines()[1:4]] == [
         ["0.1", "30.00"],
         ["0.5", "150.00"],
         ["1", "300.00"],
@@ -288,31 +288,31 @@ def test_a_strain_path_gives_stresses_as_csv(tmp_path: Path) -> None:
     path, out = tmp_path / "path.csv", tmp_path / "stress.csv"
     path.write_text("gamma_xy,eps_xx,eps_yy\n0,0,0\n0.001,0,-0.0001\n")
     arguments = ("lab", "strain-path", path, "--stress0", -50, -100, 0, *SAND)
-    told = called(*arguments)
-    assert told.returncode == DONE
-    header, first, last = told.stdout.splitlines()
+    result = called(*arguments)
+    assert result.returncode == DONE
+    header, first, last = result.stdout.splitlines()
     assert header == "eps_xx,eps_yy,gamma_xy,sig_xx,sig_yy,tau_xy,sig_zz,void_ratio"
     assert first == "0,0,0,-50,-100,0,-50,0.635"
     assert [float(value) for value in last.split(",")][:3] == [0.0, -1e-4, 1e-3]
     assert called(*arguments, "--out", out).stdout == ""
-    assert out.read_text() == told.stdout
+    assert out.read_text() == result.stdout
 
 
 def test_the_shear_cell_is_told_as_a_test_at_one_point(tmp_path: Path) -> None:
     out = tmp_path / "cell.csv"
-    told = called("lab", "cell", *SAND, "--csr", 0.3, "--spacing", 0.02, "--max-cycles", 1, "--out", out)
-    assert "largest spread" in told.stdout
-    assert "max_cycles = 1 was reached" in told.stdout
+    result = called("lab", "cell", *SAND, "--csr", 0.3, "--spacing", 0.02, "--max-cycles", 1, "--out", out)
+    assert "largest spread" in result.stdout
+    assert "max_cycles = 1 was reached" in result.stdout
     assert out.read_text(encoding="utf-8").startswith("gamma,tau,sigma_v_eff")
     assert "lab.shear_cell.size" in refused("lab", "cell", *SAND, "--csr", 0.3, "--spacing", 0.025)
 
 
 def test_calibration_prints_a_material_that_the_laboratory_and_a_scene_take(tmp_path: Path) -> None:
     out, picture = tmp_path / "sand.toml", tmp_path / "curve.png"
-    told = called("lab", "calibrate", "--spt", 6, "--G0", 470, "--out", out, "--plot", picture)
-    assert (told.returncode, told.stderr) == (DONE, "")
-    assert told.stdout.startswith("# CRR 0.09")
-    assert told.stdout.endswith(out.read_text())
+    result = called("lab", "calibrate", "--spt", 6, "--G0", 470, "--out", out, "--plot", picture)
+    assert (result.returncode, result.stderr) == (DONE, "")
+    assert result.stdout.startswith("# CRR 0.09")
+    assert result.stdout.endswith(out.read_text())
     assert picture.stat().st_size > 0
     assert "G0 = 470.0" in out.read_text()
     curve = called("lab", "crr", "--soil", out, "--csr", 0.092, "--csr", 0.03, "--max-cycles", 30)
@@ -323,9 +323,9 @@ def test_calibration_prints_a_material_that_the_laboratory_and_a_scene_take(tmp_
 
 
 def test_a_resistance_that_cannot_be_calibrated_is_warned_of() -> None:
-    told = called("lab", "calibrate", "--Dr", 0.35, "--G0", 476, "--crr", 1.2)
-    assert told.returncode == DONE
-    assert "warning: crr = 1.2 in 15 cycles cannot be met" in told.stderr
+    result = called("lab", "calibrate", "--Dr", 0.35, "--G0", 476, "--crr", 1.2)
+    assert result.returncode == DONE
+    assert "warning: crr = 1.2 in 15 cycles cannot be met" in result.stderr
     assert "--G0" in refused("lab", "calibrate", "--Dr", 0.5, "--crr", 0.1)
 
 
@@ -352,18 +352,18 @@ def test_slips_in_the_laboratory_are_refused(tmp_path: Path) -> None:
 
 
 def test_motion_info_measures(record: Path) -> None:
-    told = called("motion", "info", record, "--column", "acceleration_g")
-    assert told.returncode == DONE
-    lines = dict(line.rsplit("  ", 1) for line in told.stdout.splitlines() if "  " in line)
+    result = called("motion", "info", record, "--column", "acceleration_g")
+    assert result.returncode == DONE
+    lines = dict(line.rsplit("  ", 1) for line in result.stdout.splitlines() if "  " in line)
     found = {name.strip(): value.strip() for name, value in lines.items()}
     assert found["peak acceleration"] == "0.1 g"
     assert found["points"] == str(len(scenes.PULSE.time))
 
 
 def test_motion_spectrum_is_csv(record: Path) -> None:
-    told = called("motion", "spectrum", record, "--damping", "0.1")
-    assert told.returncode == DONE
-    header, *rows = told.stdout.splitlines()
+    result = called("motion", "spectrum", record, "--damping", "0.1")
+    assert result.returncode == DONE
+    header, *rows = result.stdout.splitlines()
     assert header == "period_s,psa_g"
     table = np.array([row.split(",") for row in rows], dtype=float)
     expected = Motion.from_csv(record).response_spectrum(0.1)
@@ -383,12 +383,12 @@ def test_motion_deconvolve_writes_the_base_s_motion_and_tells_strains(
     scene_file: Path, record: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "base.AT2"
-    told = called("motion", "deconvolve", record, "--scene", scene_file, "--out", out, "--linear")
-    assert (told.returncode, told.stderr) == (DONE, "")
+    result = called("motion", "deconvolve", record, "--scene", scene_file, "--out", out, "--linear")
+    assert (result.returncode, result.stderr) == (DONE, "")
     wanted = Motion.from_file(record).deconvolved(scenes.column().profile(), linear=True)
     np.testing.assert_allclose(Motion.from_at2(out).acceleration_g, wanted.acceleration_g, atol=1e-8)
-    assert "1 iterations, converged" in told.stdout
-    assert len(told.stdout.splitlines()) == 3 + len(scenes.column().profile().layers)
+    assert "1 iterations, converged" in result.stdout
+    assert len(result.stdout.splitlines()) == 3 + len(scenes.column().profile().layers)
     options = ("--scene", scene_file, "--out", out, "--max-frequency", 1e3)
     assert "Nyquist" in refused("motion", "deconvolve", record, *options)
 

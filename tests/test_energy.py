@@ -104,8 +104,8 @@ CONTACT = [
 )
 def test_free_field_sides_bring_what_the_balance_lacks(regions: list[Region], tmp_path: Path) -> None:
     stages = [Gravity(), Shaking(SHORT_PULSE, duration=0.8)]
-    said = unfiltered(spacing=0.5, regions=regions, sides=FreeField(), stages=stages, output=Output())
-    energy = run(scenes.dry_column(**said), tmp_path).energy()
+    settings = unfiltered(spacing=0.5, regions=regions, sides=FreeField(), stages=stages, output=Output())
+    energy = run(scenes.dry_column(**settings), tmp_path).energy()
     brought = energy["base"].max()
     assert np.abs(energy["sides"]).max() > 0.1 * brought
     assert np.abs(energy["damping"]).max() < CLOSURE * brought

@@ -1,4 +1,4 @@
-"""Small scenes give the bits that were frozen; `tests/freeze.py` tells how to freeze others on purpose."""
+"""Small scenes give the bits that were frozen; `tests/freeze.py` describes how to freeze others."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_frozen_bits(case: str, kept: freeze.Entries, tmp_path: Path) -> None:
     changed = freeze.differences(freeze.of_case(kept, case), found)
     if changed:
         _, libraries, _ = freeze.read()
-        named = [f"{name}: {told}" for name, told in changed.items()][:MOST_NAMED]
+        named = [f"{name}: {difference}" for name, difference in changed.items()][:MOST_NAMED]
         count = f"{len(changed)} of {len(found)} entries differ"
         with_libraries = f"frozen with {libraries}, here {machine.libraries()}"
         pytest.fail("\n".join([f"{count}, {with_libraries}", *named]), pytrace=False)

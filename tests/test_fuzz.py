@@ -1,4 +1,4 @@
-"""A small share of what `fuzz/fuzz_readers.py` throws at the readers, and whatever a scene may say."""
+"""A small part of the inputs of `fuzz/fuzz_readers.py`, and any value in a scene."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 import sandboil as sb
-from bad_inputs import SEEPING, SLOPE, SOUND, said, to
+from bad_inputs import SEEPING, SLOPE, SOUND, as_toml, to
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,15 +20,15 @@ INPUTS = 400
 
 
 def test_spoilt_files_are_read_or_refused(tmp_path: Path) -> None:
-    told = subprocess.run(
+    done = subprocess.run(
         [sys.executable, SCRIPT, "--inputs", str(INPUTS), "--seed", "2", "--keep", tmp_path],
         capture_output=True,
         text=True,
         check=False,
         timeout=250,
     )
-    assert told.returncode == 0, told.stdout + told.stderr
-    rows = [json.loads(line) for line in told.stdout.splitlines()]
+    assert done.returncode == 0, done.stdout + done.stderr
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(rows) == 9
     for row in rows:
         # Inputs that are all refused at their first byte would try nothing.
@@ -57,10 +57,10 @@ VALUES = st.recursive(
 @settings(max_examples=400, deadline=None)
 @given(st.sampled_from(CASES), VALUES)
 @pytest.mark.filterwarnings("ignore::RuntimeWarning:shapely")
-def test_whatever_a_scene_says_is_a_scene_or_refused(case: tuple[dict[str, Any], str], value: object) -> None:
+def test_any_value_in_a_scene_is_accepted_or_refused(case: tuple[dict[str, Any], str], value: object) -> None:
     scene, place = case
     try:
-        made = sb.Scene.from_toml(said(scene, to(place, value)))
+        made = sb.Scene.from_toml(as_toml(scene, to(place, value)))
     except sb.InvalidInput:
         return
     assert sb.Scene.from_toml(made.to_toml(resolved=True)) == made

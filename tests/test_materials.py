@@ -1,4 +1,4 @@
-"""Every soil model from Python: what it refuses, what it says in TOML, and a small scene that it carries."""
+"""Every soil model from Python: refusals, its form in TOML, and a small scene."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ REFUSED: list[tuple[str, dict[str, Any], str, object, str, str | None]] = [
     ("pressure_elastic", {"pref": 1.0}, "material.pref", 1.0, "unknown key", "did you mean 'p_ref'?"),
     ("pressure_elastic", {"nu": 0.3}, "material", None, "exactly one pair", None),
     ("total_stress", {"Su": 0.0}, "material.Su", 0.0, "must be greater than 0", "grows with pressure"),
-    ("total_stress", {"Sr": 21.0}, "material.Sr", 21.0, "must be at most Su", "strength that stays"),
+    ("total_stress", {"Sr": 21.0}, "material.Sr", 21.0, "must be at most Su", "a soil that does not soften"),
     ("total_stress", {"SU": 3.0}, "material.SU", 3.0, "unknown key", "did you mean 'Su'?"),
     ("total_stress", {"undrained_strength": 3.0}, "material.Su", 20.0, "was given twice", None),
     (
@@ -204,7 +204,7 @@ def test_scene_says_the_same_in_toml_and_refuses_alike(kind: str) -> None:
     assert refused.value.path == "scene.regions[0].material.G0"
 
 
-def test_what_only_the_core_knows_is_told_with_its_region() -> None:
+def test_a_refusal_of_the_core_names_the_region() -> None:
     text = shaken("drucker_prager").to_toml().replace("psi = 5.0", "psi = 40.0")
     with pytest.raises(
         InvalidInput, match=r"scene\.regions\[0\]\.material\.psi = 40\.0: must be in \[0, phi\]"

@@ -34,7 +34,7 @@ def slope(stages: list[object], **changes: object) -> sb.Scene:
 
 
 def test_a_falling_reservoir_moves_no_submerged_slope(tmp_path: Path) -> None:
-    """What stands on the ground presses through the pressure of the water alone."""
+    """Water above the ground acts through the water pressure at the surface only."""
     falling = sb.Reservoir("surface", level=[(0.0, 7.0), (1.0, 4.5)])
     stages = [sb.Gravity(), sb.Shaking(duration=4.0, conditions=[falling])]
     run = sb.run(slope(stages), tmp_path / "out")
@@ -45,7 +45,7 @@ def test_a_falling_reservoir_moves_no_submerged_slope(tmp_path: Path) -> None:
     assert np.abs(run.field("displacement")).max() < 5e-3 * -change * 4.0 / modulus
 
 
-def test_conditions_go_on_unless_the_stage_has_its_own() -> None:
+def test_conditions_continue_unless_the_stage_has_its_own() -> None:
     steady = sb.Seepage([sb.Reservoir("surface", level=7.0), sb.Head("left", head=8.0)])
     first, second, third = (
         sb.Shaking(duration=1.0),
@@ -53,19 +53,19 @@ def test_conditions_go_on_unless_the_stage_has_its_own() -> None:
         sb.Shaking(duration=1.0),
     )
     scene = slope([steady, sb.Gravity(), first, second, third])
-    told = [
+    conditions = [
         [(c.kind, c.value_at(0.5), rest) for c, rest in scene.moving_conditions(stage)]
         for stage in (first, second, third)
     ]
-    assert told[0] == [("reservoir", 7.0, 7.0), ("head", 8.0, 8.0)]
-    assert told[1] == [("reservoir", 6.75, 7.0)]
-    # The level that the stage before ended with.
-    assert told[2] == [("reservoir", 6.0, 7.0)]
+    assert conditions[0] == [("reservoir", 7.0, 7.0), ("head", 8.0, 8.0)]
+    assert conditions[1] == [("reservoir", 6.75, 7.0)]
+    # The level at the end of the stage before.
+    assert conditions[2] == [("reservoir", 6.0, 7.0)]
     ended = sb.Shaking(duration=1.0, conditions=[])
     assert slope([steady, sb.Gravity(), ended]).moving_conditions(ended) == []
 
 
-def test_what_goes_on_moves_nothing(tmp_path: Path) -> None:
+def test_continued_conditions_move_nothing(tmp_path: Path) -> None:
     steady = sb.Seepage([sb.Reservoir("surface", level=7.0), sb.Head("left", head=8.0)])
     run = sb.run(slope([steady, sb.Gravity(), sb.Shaking(duration=0.5)]), tmp_path / "out")
     assert np.abs(run.field("excess_pore_pressure")).max() < 1e-9
@@ -80,7 +80,7 @@ def test_conditions_of_a_shaking_stage_come_from_toml(tmp_path: Path) -> None:
 
 
 def test_a_drain_lowers_what_shaking_raises() -> None:
-    """Beside a drain excess pressure stays below what it is without."""
+    """Excess pressure beside a drain is lower than without the drain."""
     motion = sb.Motion.ricker(frequency=2.0, pga_g=0.1)
 
     def largest(conditions: list[object]) -> float:

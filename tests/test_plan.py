@@ -1,4 +1,4 @@
-"""What a plan tells is what a run does, and it leaves no trace."""
+"""A plan agrees with the run, and writes nothing."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def short_trial(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plan_module, "TRIAL_SECONDS", 0.2)
 
 
-def test_the_plan_foresees_the_run(finished: Run) -> None:
+def test_the_plan_agrees_with_the_run(finished: Run) -> None:
     plan = scenes.column().plan()
     assert isinstance(plan, Plan)
     gravity, shaking = plan.stages
@@ -49,18 +49,18 @@ def test_the_plan_foresees_the_run(finished: Run) -> None:
     assert shaking.dt_limit == finished.time_steps()[1][0]
     assert shaking.steps == pytest.approx(finished.accounts()["steps"], rel=0.05)
     assert (plan.nodes, plan.stress_nodes, shaking.duration) == (32, 64, 0.8)
-    told = finished.accounts()
-    assert plan.arrays["soil_state"] == told["bytes_soil_state"]
+    accounts = finished.accounts()
+    assert plan.arrays["soil_state"] == accounts["bytes_soil_state"]
     # Timed on a machine that others use too: the order of magnitude.
     assert plan.wall_time is not None
-    measured = finished.accounts("gravity")["wall_time_s"] + told["wall_time_s"]
+    measured = finished.accounts("gravity")["wall_time_s"] + accounts["wall_time_s"]
     assert 0.1 * measured < plan.wall_time < 10.0 * measured
     assert plan.file_size == pytest.approx(grown_bytes(finished), rel=0.05)
 
 
-def test_the_page_tells_what_is_on_and_why() -> None:
+def test_the_page_lists_what_is_on_and_why() -> None:
     text = str(scenes.column().plan())
-    for told in (
+    for line in (
         "nodes         32",
         "on   pore water             water table at elevation 4 m",
         "off  free-field columns     the sides are periodic",
@@ -70,17 +70,17 @@ def test_the_page_tells_what_is_on_and_why() -> None:
         "pore pressure coefficient B",
         "standard; what presets save and cost is measured on the level ground",
     ):
-        assert told in text
+        assert line in text
 
 
-def test_water_acceleration_is_told_as_the_solver_chose() -> None:
-    def told(diffusion: str) -> tuple[bool, str]:
+def test_the_plan_reports_the_acceleration_term_that_the_solver_chose() -> None:
+    def acceleration(diffusion: str) -> tuple[bool, str]:
         plan = scenes.column(numerics={"diffusion": diffusion}).plan()
         ((on, reason),) = [(on, reason) for name, on, reason in plan.physics if name == "water acceleration"]
         return on, reason
 
-    assert told("explicit")[0]
-    assert told("implicit") == (False, "pore pressure diffusion is implicit")
+    assert acceleration("explicit")[0]
+    assert acceleration("implicit") == (False, "pore pressure diffusion is implicit")
 
 
 @pytest.mark.parametrize("name", frozen_scenes.ALL)
@@ -127,7 +127,7 @@ def test_a_dry_scene_without_shaking_plans_neither() -> None:
     assert set(plan.arrays) == {"motion", "constant_forces", "stress", "geometry", "phases"}
 
 
-def test_a_long_way_to_rest_is_not_foretold(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_steps_of_a_long_static_stage_are_not_estimated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plan_module, "TRIAL_SECONDS", 0.0)
     plan = scenes.column(stages=[Gravity(tolerance=1e-12)]).plan()
     assert plan.stages[0].steps is None

@@ -1,4 +1,4 @@
-"""Pictures: each is drawn from what the run holds, every axis says what it shows, references lie over."""
+"""Pictures: each is drawn from the results, every axis has a label, references share the panels."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PNG = b"\x89PNG"
 
 @pytest.fixture(scope="module")
 def reference_folder(finished: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The run's own results in the form of another code's, halved so that they can be told apart."""
+    """The run's own results in the form of another code's, halved to distinguish them."""
     folder = tmp_path_factory.mktemp("reference")
 
     def write(name: str, **columns: np.ndarray) -> None:
@@ -142,7 +142,7 @@ def test_a_run_without_shaking_is_refused(tmp_path: Path) -> None:
         plot(run(scenes.column(stages=[Gravity()]), tmp_path))
 
 
-def test_a_reference_that_is_none_is_refused(tmp_path: Path, finished: Run, reference_folder: Path) -> None:
+def test_an_invalid_reference_is_refused(tmp_path: Path, finished: Run, reference_folder: Path) -> None:
     with pytest.raises(InvalidInput, match=r"histories\.csv"):
         Reference.read(tmp_path)
     for name in ("histories", "spectrum", "stress_strain"):

@@ -1,4 +1,4 @@
-"""Simulations beside each other: in one thread by turns, in several threads and in several processes."""
+"""Several simulations at once: in one thread by turns, in several threads and in several processes."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def assert_same(found: Fields, expected: Fields) -> None:
 
 @pytest.fixture(scope="module")
 def alone() -> dict[float, Fields]:
-    """What two grounds do, each by itself."""
+    """The results of two simulations, each computed alone."""
     return {height: computed(height) for height in (4.0, 4.5)}
 
 
@@ -89,8 +89,8 @@ def test_simulations_in_threads_are_as_alone(alone: dict[float, Fields]) -> None
         assert_same(found[height], expected)
 
 
-def test_python_goes_on_while_the_core_computes() -> None:
-    """Were Python held, this thread had one turn at each look of the core for whoever wants to stop it."""
+def test_python_continues_while_the_core_computes() -> None:
+    """If the core held the interpreter, this thread would run only when the core checks for a signal."""
     simulation = Simulation(ground(), threads=2)
     simulation.run_stage()
     thread = threading.Thread(target=simulation.run_stage)
@@ -123,21 +123,21 @@ while count() > before:
 """
 
 
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="the system does not tell its threads")
-def test_each_simulation_has_threads_of_its_own_and_takes_them_away() -> None:
-    """In a process of its own: threads of other tests may still be about to end."""
-    told = subprocess.run(
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="the system does not list its threads")
+def test_each_simulation_starts_and_ends_its_own_threads() -> None:
+    """In a separate process, because threads of other tests may not have ended yet."""
+    done = subprocess.run(
         [sys.executable, "-c", THREADS],
         capture_output=True,
         text=True,
         cwd=Path(__file__).parent,
         check=False,
     )
-    assert told.returncode == 0, told.stderr
+    assert done.returncode == 0, done.stderr
 
 
 def test_an_interrupted_step_leaves_the_simulation_readable(alone: dict[float, Fields]) -> None:
-    """Ctrl-C in a notebook: the core returns between two steps, and goes on bit for bit when asked."""
+    """Ctrl-C in a notebook: the core returns between two steps, and continues bit for bit on request."""
     simulation = Simulation(ground(), threads=2)
     simulation.run_stage()
     threading.Timer(0.02, os.kill, (os.getpid(), signal.SIGINT)).start()
@@ -168,13 +168,13 @@ def test_a_copied_scene_is_the_scene(name: str, copied: Callable[[Scene], Scene]
     scene = SCENES[name]()
     again = copied(scene)
     assert again == scene
-    # What was said and what is a default is told apart too.
+    # Given values and defaults stay distinct, too.
     assert again.to_toml() == scene.to_toml()
     assert again.to_toml(resolved=True) == scene.to_toml(resolved=True)
 
 
 def work(results: Any, scene: Scene, inherited: Simulation | None) -> None:
-    """What a worker does: a scene of its own, and what is left of one that it was forked with."""
+    """The work of a worker: its own scene, and the rest of a simulation that it was forked with."""
     simulation = Simulation(scene, threads=2)
     simulation.run_stage()
     simulation.run_stage()
@@ -186,14 +186,14 @@ def work(results: Any, scene: Scene, inherited: Simulation | None) -> None:
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_workers_compute_what_their_parent_would(method: str, alone: dict[float, Fields]) -> None:
-    """Also after the parent's own threads have worked, of which a forked worker has none."""
+    """Also after the parent has used its threads, which a forked worker does not have."""
     if method not in multiprocessing.get_all_start_methods():
         pytest.skip(f"the system cannot {method}")
     context = multiprocessing.get_context(method)
     present = Simulation(ground(), threads=2)
     present.run_stage()
     results: Any = context.Queue()
-    # A simulation is no data that could be sent; a forked worker has it already.
+    # A simulation cannot be sent to a worker; a forked worker has it already.
     inherited = present if method == "fork" else None
     worker = context.Process(target=work, args=(results, ground(4.5), inherited))
     worker.start()

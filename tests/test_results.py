@@ -1,4 +1,4 @@
-"""The results file: its layout as VTKHDF, its units, and what the reader makes of it."""
+"""The results file: its layout as VTKHDF, its units, and its reader."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_every_dataset_says_its_unit(finished: Run) -> None:
     assert not without
 
 
-def test_the_file_tells_what_made_it(finished: Run) -> None:
+def test_the_file_contains_what_made_it(finished: Run) -> None:
     with h5py.File(finished.path) as file:
         assert file.attrs["format_version"] == FORMAT_VERSION
         assert Scene.from_toml(file["scene"].asstr()[0]) == scenes.column()
@@ -102,7 +102,7 @@ def test_vtk_reads_what_we_wrote(finished: Run) -> None:
         assert not points[:, 2].any()
 
 
-def test_a_second_shaking_goes_on_in_vtk_time_and_starts_anew_in_stage_time(tmp_path: Path) -> None:
+def test_vtk_time_continues_in_a_second_shaking_and_stage_time_starts_at_zero(tmp_path: Path) -> None:
     short = Shaking(scenes.PULSE, duration=0.2)
     results = run(scenes.column(stages=[Gravity(), short, short]), tmp_path)
     assert results.stages == ["gravity", "shaking", "shaking_2"]
@@ -149,7 +149,7 @@ def test_ratios_are_pressures_over_the_geostatic_stress(finished: Run) -> None:
     assert np.isnan(finished.history("r_u").values).all(), "nothing stands on the surface"
 
 
-def test_accelerations_are_told_in_g_when_asked(finished: Run) -> None:
+def test_accelerations_are_given_in_g_on_request(finished: Run) -> None:
     plain, in_g = finished.history("acceleration_x"), finished.history("acceleration_x", unit="g")
     assert (plain.unit, in_g.unit) == ("m/s2", "g")
     np.testing.assert_allclose(plain.values, 9.81 * in_g.values)
@@ -157,8 +157,8 @@ def test_accelerations_are_told_in_g_when_asked(finished: Run) -> None:
         finished.history("velocity_x", unit="g")
 
 
-def test_what_is_not_there_is_refused_with_what_is(finished: Run) -> None:
-    for ask, told in (
+def test_an_unknown_name_is_refused_with_the_known_ones(finished: Run) -> None:
+    for ask, allowed in (
         (lambda: finished.history("aceleration_x"), "did you mean 'acceleration_x'"),
         (lambda: finished.history("r_u", depth=2.0), "depth 1 m at (0.25, 3), depth 3 m"),
         (lambda: finished.history("r_u", at=(0.0, 0.0)), "name it in output.depths or output.points"),
@@ -172,7 +172,7 @@ def test_what_is_not_there_is_refused_with_what_is(finished: Run) -> None:
     ):
         with pytest.raises(InvalidInput) as caught:
             ask()
-        assert told in str(caught.value)
+        assert allowed in str(caught.value)
 
 
 def test_the_spectrum_is_that_of_the_surface_acceleration(finished: Run) -> None:
@@ -219,7 +219,7 @@ def test_envelopes_bound_every_frame(finished: Run) -> None:
     assert finished.envelope("r_u").max() > finished.history("r_u", depth=1.0).values.max() * 0.9
 
 
-def test_settlement_and_surface_tell_of_the_same_ground(finished: Run) -> None:
+def test_settlement_and_surface_agree(finished: Run) -> None:
     settlement, surface = finished.settlement(), finished.surface()
     assert settlement.values[0] == 0.0
     assert settlement.time[-1] == surface.time == finished.times[-1]
@@ -248,8 +248,8 @@ def test_the_summary_is_a_dict_and_a_page(finished: Run) -> None:
     assert summary["gravity"]["counts"]["base_calls"] == 0
     assert set(summary["pore pressure coefficient B"]) == {"loose", "dense"}
     text = str(summary)
-    for told in ("status", "complete", "time step limited by", "wall time", "pressure_floors", "depth 3 m"):
-        assert told in text
+    for part in ("status", "complete", "time step limited by", "wall time", "pressure_floors", "depth 3 m"):
+        assert part in text
 
 
 def test_csv_holds_every_history(finished: Run, tmp_path: Path) -> None:
@@ -270,7 +270,7 @@ def test_csv_holds_every_history(finished: Run, tmp_path: Path) -> None:
 
 
 def test_a_folder_without_results_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="must hold a results"):
+    with pytest.raises(InvalidInput, match="must contain a results"):
         load(tmp_path)
     (tmp_path / FILE_NAME).write_text("not HDF5")
     with pytest.raises(InvalidInput, match="must be a sound file"):

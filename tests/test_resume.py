@@ -1,4 +1,4 @@
-"""Runs that are stopped in every way there is, and gone on with: the same bits, and nothing lost silently."""
+"""Runs that are stopped in every possible way and continued: the same bits, and every loss is reported."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from sandboil.run.columns import FILE_NAME as COLUMNS
 COMMIT_INTERVAL = writer._COMMIT_INTERVAL
 HERE = Path(__file__).parent
 
-# A run in a process of its own that commits every frame and stores its state all the time.
+# A run in a separate process that commits every frame and stores its state as often as possible.
 RUNNING = """
 import sys, warnings
 import scenes
@@ -59,7 +59,7 @@ class Killed(BaseException):
 
 
 def contents(folder: Path) -> dict[str, Any]:
-    """All that a results file holds but wall times, the machine, and how often it was resumed."""
+    """The content of a results file, without wall times, the machine, and the number of resumptions."""
     found: dict[str, Any] = {}
 
     def look(name: str, item: h5py.Group | h5py.Dataset) -> None:
@@ -82,7 +82,7 @@ def assert_same(folder: Path, other: Path) -> None:
 
 
 def states(folder: Path) -> list[Path]:
-    """The states of a run under way, oldest first."""
+    """The checkpoints of an incomplete run, oldest first."""
     return sorted((folder / checkpoints.FOLDER_NAME).glob("[0-9]*"))
 
 
@@ -94,7 +94,7 @@ def whole(finished: Run) -> Path:
 def killed_run(
     folder: Path, when: int, monkeypatch: pytest.MonkeyPatch, scene: Scene | None = None, **options: Any
 ) -> None:
-    """A run that ends at its `when`-th look at the clock as if it were killed; its states are 0.1 s apart."""
+    """A run that ends, as if killed, at its `when`-th reading of the clock; checkpoints every 0.1 s."""
     looks = 0
     advance = sb.Simulation.advance
 
@@ -116,9 +116,9 @@ def killed_run(
 
 
 def kill(folder: Path, after: float, threads: int, resume: bool) -> bool:
-    """Kill a run so many seconds after it has results; tells whether it was still running."""
-    said = [str(folder), str(threads), "resume" if resume else "new"]
-    process = subprocess.Popen([sys.executable, "-c", RUNNING, *said], cwd=HERE, stderr=subprocess.PIPE)
+    """Kill a run so many seconds after it has results; returns whether it was still running."""
+    arguments = [str(folder), str(threads), "resume" if resume else "new"]
+    process = subprocess.Popen([sys.executable, "-c", RUNNING, *arguments], cwd=HERE, stderr=subprocess.PIPE)
     deadline = time.monotonic() + 60.0
     while not (folder / FILE_NAME).exists():
         assert process.poll() is None, process.communicate()[1]
@@ -132,7 +132,7 @@ def kill(folder: Path, after: float, threads: int, resume: bool) -> bool:
 
 
 def assert_readable(folder: Path) -> None:
-    """By h5py, by us, and what is there is sound."""
+    """h5py and the reader open the results, and their content is valid."""
     with h5py.File(folder / FILE_NAME, "r") as file:
         steps = file["VTKHDF/Steps"]
         assert steps.attrs["NSteps"] == len(steps["Values"]) == len(file["frames/time"])
@@ -211,7 +211,7 @@ def test_a_run_killed_between_two_stages_begins_the_second(
     assert_same(tmp_path / "out", tmp_path / "whole")
 
 
-def test_a_run_killed_at_its_very_end_has_only_to_say_so(
+def test_a_run_killed_after_its_last_step_is_completed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path
 ) -> None:
     def closing(*_: Any) -> None:
@@ -242,7 +242,7 @@ def test_keeping_states_changes_no_bit(tmp_path: Path, whole: Path, threads: int
     assert_same(tmp_path, whole)
 
 
-def test_a_run_killed_before_its_first_checkpoint_begins_anew(
+def test_a_run_killed_before_its_first_checkpoint_starts_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path
 ) -> None:
     killed_run(tmp_path, 1, monkeypatch)
@@ -283,15 +283,15 @@ def damage(path: Path) -> None:
     path.write_bytes(data)
 
 
-def test_a_damaged_checkpoint_is_told_and_the_one_before_is_taken(
+def test_a_damaged_checkpoint_is_reported_and_the_one_before_is_used(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path
 ) -> None:
     killed_run(tmp_path, 45, monkeypatch)
     _, newest = states(tmp_path)
     damage(newest)
-    with pytest.warns(ResumeWarning, match=rf"{newest.name} is damaged: its checksum .* left out") as told:
+    with pytest.warns(ResumeWarning, match=rf"{newest.name} is damaged: its checksum .* left out") as caught:
         run(scenes.column(), tmp_path, threads=1, resume=True)
-    assert len(told) == 1
+    assert len(caught) == 1
     assert_same(tmp_path, whole)
 
 
@@ -311,7 +311,7 @@ def test_without_a_sound_checkpoint_nothing_is_touched(
 
 
 @pytest.mark.parametrize("length", [0, 50_000])
-def test_results_that_cannot_be_read_are_those_of_their_twin(
+def test_results_that_cannot_be_read_are_replaced_by_the_second_copy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path, length: int
 ) -> None:
     twin = twin_of(tmp_path / FILE_NAME)
@@ -322,7 +322,7 @@ def test_results_that_cannot_be_read_are_those_of_their_twin(
     os.truncate(tmp_path / FILE_NAME, length)
     with pytest.raises(InvalidInput, match="must be a sound file"):
         load(tmp_path)
-    # The twin is one commit behind, and so the newest checkpoint may be too far ahead.
+    # The second copy is one commit behind, so the newest checkpoint may be later than its last frame.
     with (
         pytest.warns(ResumeWarning, match="its second copy is used"),
         pytest.warns(ResumeWarning, match="left out: .* ends before it"),
@@ -338,17 +338,17 @@ def test_only_the_same_scene_resumes(tmp_path: Path, monkeypatch: pytest.MonkeyP
     killed_run(tmp_path, 45, monkeypatch)
     before = (tmp_path / FILE_NAME).read_bytes()
     stages = [sb.Gravity(), sb.Shaking(scenes.PULSE.scaled(factor=1.01), duration=0.8)]
-    for changed, told in (
+    for changed, allowed in (
         (scenes.column(spacing=0.5), "spacing, position"),
         (scenes.column(stages=stages), "another stages.shaking;"),
         (scenes.column(output=sb.Output(depths=[1.0, 3.0], points=[(0.25, 0.6)], field_dt=0.2)), "output"),
     ):
-        with pytest.raises(InvalidInput, match=told):
+        with pytest.raises(InvalidInput, match=allowed):
             run(changed, tmp_path, resume=True)
     assert (tmp_path / FILE_NAME).read_bytes() == before
 
 
-def test_what_cannot_be_resumed_is_refused(tmp_path: Path, whole: Path) -> None:
+def test_a_run_that_cannot_be_resumed_is_refused(tmp_path: Path, whole: Path) -> None:
     with pytest.raises(InvalidInput, match=f"must hold a run to resume, but has no {FILE_NAME}"):
         run(scenes.column(), tmp_path / "none", resume=True)
     assert not (tmp_path / "none").exists()
@@ -407,12 +407,12 @@ def test_a_further_stage_follows_the_last_of_another_run(tmp_path: Path, whole: 
 
 
 def test_other_ground_does_not_start_there(tmp_path: Path, whole: Path) -> None:
-    for changed, told in (
+    for changed, allowed in (
         ({"water": sb.Water(bulk_modulus=2.0e6)}, "another water;"),
         ({"numerics": sb.Numerics(smoothing_ratio=1.3)}, "another numerics;"),
         ({"stages": [sb.Gravity(tolerance=1e-3), sb.Shaking(scenes.PULSE, duration=0.4)]}, "stages.gravity"),
     ):
-        with pytest.raises(InvalidInput, match=told) as caught:
+        with pytest.raises(InvalidInput, match=allowed) as caught:
             run(scenes.column(**changed), tmp_path / "out", start=(whole, "gravity"))
         assert caught.value.path == "start"
     with pytest.raises(InvalidInput, match="a stage that it has completed: gravity, shaking"):
@@ -426,7 +426,7 @@ def test_other_ground_does_not_start_there(tmp_path: Path, whole: Path) -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_run_that_is_asked_to_stop_resumes_where_it_was(
+def test_a_run_that_is_asked_to_stop_resumes_from_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path, number: signal.Signals
 ) -> None:
     looks = 0
@@ -441,11 +441,11 @@ def test_a_run_that_is_asked_to_stop_resumes_where_it_was(
 
     with monkeypatch.context() as patch:
         patch.setattr(sb.Simulation, "advance", advancing)
-        with pytest.raises(RunInterrupted, match="can be resumed") as told:
+        with pytest.raises(RunInterrupted, match="can be resumed") as caught:
             run(scenes.column(), tmp_path, threads=1)
     assert load(tmp_path).status == "interrupted"
     at = load(tmp_path).times[-1]
-    assert f"{at:.6g} s" in str(told.value)
+    assert f"{at:.6g} s" in str(caught.value)
     begun: list[float] = []
 
     def beginning(simulation: sb.Simulation, until: float, seconds: float) -> bool:
@@ -458,7 +458,7 @@ def test_a_run_that_is_asked_to_stop_resumes_where_it_was(
     assert_same(tmp_path, whole)
 
 
-# A run that does not come to look whether it was asked to stop.
+# A run that never checks whether it was asked to stop.
 HELD = """
 import sys, time
 import sandboil as sb, scenes
@@ -486,7 +486,7 @@ def test_a_second_signal_ends_a_run_at_once(tmp_path: Path, number: signal.Signa
     assert load(tmp_path).status == "running"
 
 
-# No room, no folder, no rights
+# No space, no folder, no permission
 
 
 @contextlib.contextmanager
@@ -514,23 +514,23 @@ def fill(disk: Path, left: int) -> Path:
 
 
 def stopped_on_full_disk(disk: Path, left: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run on a disk with so much room; what stands there afterwards can be read."""
+    """Run on a disk with so much free space; the files on it can be read afterwards."""
     ballast = fill(disk, left)
     with monkeypatch.context() as patch:
         patch.setattr(writer, "_COMMIT_INTERVAL", 0.0)
-        with pytest.raises(SandboilError, match="No space left on device") as told:
+        with pytest.raises(SandboilError, match="No space left on device") as caught:
             run(scenes.column(), disk / "out", threads=1, checkpoint_time=0.05)
     ballast.unlink()
-    if isinstance(told.value, InvalidInput):
-        # Not even the head of the results had room: refused before any work.
+    if isinstance(caught.value, InvalidInput):
+        # There was no space even for the head of the results: refused before any work.
         assert not (disk / "out" / FILE_NAME).exists()
         return
-    assert "results last written are whole" in str(told.value)
+    assert "results last written are whole" in str(caught.value)
     assert_readable(disk / "out")
 
 
 @pytest.mark.parametrize("left", [300_000, 450_000, 600_000])
-def test_a_full_disk_ends_the_run_and_room_lets_it_go_on(
+def test_a_full_disk_ends_the_run_which_continues_when_there_is_space(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Path, left: int
 ) -> None:
     with small_disk(tmp_path / "disk", 20_000_000) as disk:
@@ -567,7 +567,7 @@ def test_a_folder_that_can_no_longer_be_written_ends_the_run(
         if looks == 30 and what == "removed":
             shutil.rmtree(tmp_path / "out")
         elif looks == 30 and what == "read-only":
-            # So a kernel answers that has met an error of the disk.
+            # The answer of a kernel after an error of the disk.
             patch.setattr(os, "pwrite", read_only)
         elif looks == 30:
             resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, limits[1]))
@@ -578,11 +578,11 @@ def test_a_folder_that_can_no_longer_be_written_ends_the_run(
         try:
             with pytest.raises(
                 SandboilError, match=r"could not be written to .*: remove the cause and resume"
-            ) as told:
+            ) as caught:
                 run(scenes.column(), tmp_path / "out", threads=1, checkpoint_time=0.05)
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    assert not isinstance(told.value, InvalidInput), "the command exits with 3"
+    assert not isinstance(caught.value, InvalidInput), "the command exits with 3"
     if what != "removed":
         assert_readable(tmp_path / "out")
         resumed(tmp_path / "out", threads=1)

@@ -138,7 +138,7 @@ def test_an_unknown_field_is_refused_with_the_nearest_name() -> None:
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, True])
-def test_a_number_of_threads_that_is_none_is_refused(threads: int) -> None:
+def test_an_invalid_number_of_threads_is_refused(threads: int) -> None:
     with pytest.raises(InvalidInput, match="threads"):
         Simulation(scenes.column(), threads=threads)
 
@@ -180,7 +180,7 @@ def test_gravity_followed_by_shaking_is_read_at_its_start(finished: Run) -> None
     np.testing.assert_array_equal(finished.field("r_u", 0.0), 0.0)
 
 
-def test_ground_that_does_not_come_to_rest_is_told(tmp_path: Path) -> None:
+def test_ground_that_does_not_come_to_rest_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(SandboilError, match="not at rest after 5 steps"):
         run(scenes.column(stages=[Gravity(tolerance=1e-12, max_steps=5)]), tmp_path)
     assert load(tmp_path).status == "stopped"
@@ -202,11 +202,11 @@ def test_accuracy_fills_only_what_the_scene_leaves_open(tmp_path: Path) -> None:
     assert with_accuracy(open_scene, "draft").numerics.integrator_tolerance == 1.0e-4
     assert with_accuracy(open_scene, "draft").numerics.time_step_factor == 0.9
     assert with_accuracy(open_scene, "reference").numerics.diffusion == "explicit"
-    said = scenes.column(
+    scene = scenes.column(
         numerics=Numerics(integrator_tolerance=3.0e-5, time_step_factor=0.5, diffusion="implicit")
     )
     for accuracy in ("draft", "standard", "reference"):
-        assert with_accuracy(said, accuracy) == said
+        assert with_accuracy(scene, accuracy) == scene
     with pytest.raises(InvalidInput, match="did you mean 'draft'"):
         with_accuracy(open_scene, "drafty")
     results = run(scenes.column(stages=[Gravity()]), tmp_path, accuracy="draft")
@@ -251,29 +251,29 @@ def test_a_motion_that_cannot_be_read_is_refused_and_leaves_no_folder(tmp_path: 
 def test_divergence_keeps_what_was_computed(tmp_path: Path) -> None:
     with pytest.raises(SimulationDiverged) as caught:
         run(scenes.diverging_column(), tmp_path)
-    told = caught.value
+    error = caught.value
     results = load(tmp_path)
     assert results.status == "stopped"
-    assert results.message == str(told)
-    assert told.quantity in results.message
-    assert 0 <= told.node < len(results.position)
-    x, y = told.position
-    assert f"node {told.node} at" in results.message
+    assert results.message == str(error)
+    assert error.quantity in results.message
+    assert 0 <= error.node < len(results.position)
+    x, y = error.position
+    assert f"node {error.node} at" in results.message
     assert np.isfinite([x, y]).all()
     # The last frame is the state in which it stopped.
-    assert results.times[-1] == told.time
-    assert len(results.history("velocity_x").time) > 0 or told.time < 0.05
+    assert results.times[-1] == error.time
+    assert len(results.history("velocity_x").time) > 0 or error.time < 0.05
 
 
 def test_divergence_leaves_its_neighbourhood(tmp_path: Path) -> None:
     with pytest.raises(SimulationDiverged) as caught:
         run(scenes.diverging_column(), tmp_path)
-    told, results = caught.value, load(tmp_path)
+    error, results = caught.value, load(tmp_path)
     with (tmp_path / "neighbourhood.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    # The offending node and all others within six spacings at rest.
-    assert int(rows[0]["node"]) == told.node
-    away = np.linalg.norm(results.position - results.position[told.node], axis=1)
+    # The diverged node and all others within six spacings at rest.
+    assert int(rows[0]["node"]) == error.node
+    away = np.linalg.norm(results.position - results.position[error.node], axis=1)
     assert {int(row["node"]) for row in rows} == set(np.flatnonzero(away <= 6.0 * 0.25).tolist())
     for row in rows:
         node = int(row["node"])
@@ -282,7 +282,7 @@ def test_divergence_leaves_its_neighbourhood(tmp_path: Path) -> None:
         assert float(row["velocity_x (m/s)"]) == results.field("velocity")[node, 0]
         assert float(row["sigma_v_eff (kPa)"]) == results.field("sigma_v_eff")[node]
     assert (tmp_path / "neighbourhood.png").read_bytes().startswith(b"\x89PNG")
-    assert str(tmp_path / "neighbourhood.csv") in told.__notes__[-1]
+    assert str(tmp_path / "neighbourhood.csv") in error.__notes__[-1]
 
 
 def test_a_neighbourhood_that_cannot_be_written_hides_no_divergence(
@@ -298,10 +298,10 @@ def test_a_neighbourhood_that_cannot_be_written_hides_no_divergence(
     assert load(tmp_path).status == "stopped"
 
 
-def test_a_diverged_run_is_gone_on_with_from_its_last_state(tmp_path: Path) -> None:
+def test_a_diverged_run_continues_from_its_last_state(tmp_path: Path) -> None:
     with pytest.raises(SimulationDiverged) as first:
         run(scenes.diverging_column(), tmp_path / "out")
-    # It is the same run, and so diverges in the same place; its ground at rest serves one that does not.
+    # The same run diverges at the same place; a run that does not diverge can start from its ground at rest.
     with pytest.raises(SimulationDiverged) as again:
         run(scenes.diverging_column(), tmp_path / "out", resume=True)
     assert str(again.value) == str(first.value)
@@ -311,7 +311,7 @@ def test_a_diverged_run_is_gone_on_with_from_its_last_state(tmp_path: Path) -> N
 
 
 def interrupt_when_shaking(folder: Path, number: signal.Signals) -> subprocess.Popen[str]:
-    """A run in a process of its own, sent a signal once its file holds some shaking."""
+    """A run in a separate process, sent a signal once its file contains some shaking."""
     code = (
         "import scenes, sandboil as sb\n"
         "scene = scenes.column(stages=[sb.Gravity(), sb.Shaking(scenes.PULSE, duration=1000.0)])\n"
@@ -332,8 +332,8 @@ def interrupt_when_shaking(folder: Path, number: signal.Signals) -> subprocess.P
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_is_readable(tmp_path: Path, number: signal.Signals) -> None:
     process = interrupt_when_shaking(tmp_path, number)
-    told = process.communicate(timeout=60)[1]
-    assert RunInterrupted.__name__ in told
+    error = process.communicate(timeout=60)[1]
+    assert RunInterrupted.__name__ in error
     results = load(tmp_path)
     assert results.status == "interrupted"
     assert "interrupted in shaking" in results.message

@@ -1,4 +1,4 @@
-"""Ground that flows, from Python."""
+"""Run-out, from Python."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ SPACING = 0.01
 
 
 def heap(*, wet: bool = False, stages: list[object] | None = None, **changes: object) -> sb.Scene:
-    """A heap of 0.2 x 0.1 m between walls, dry or full of water; the right wall is taken away."""
+    """A heap of 0.2 x 0.1 m between walls, dry or full of water; the right wall is removed."""
     water = {"water": sb.Water(), "water_table": sb.WaterTable(depth=0.0)} if wet else {}
     given = {
         "regions": [
@@ -75,7 +75,7 @@ def test_a_heap_flows_and_comes_to_rest(tmp_path: Path) -> None:
 
 
 def test_water_goes_with_a_heap_and_leaves_it(tmp_path: Path) -> None:
-    """In air, all pressure is gone in the end; under water, that of each grain's own depth is left."""
+    """The final pressure is zero in air, and hydrostatic at each particle under water."""
     for still, level in (([], 0.0), ([(0.0, 0.5)], 0.5)):
         stage = sb.RunOut(1.0, open_sides=["right"], still_water=still)
         run = sb.run(heap(wet=True, stages=[sb.Gravity(), stage]), tmp_path / str(level))
@@ -85,13 +85,13 @@ def test_water_goes_with_a_heap_and_leaves_it(tmp_path: Path) -> None:
         assert (run.position[:, 0].max() + 0.05) < places[:, 0].max()
 
 
-def test_walls_hold_what_is_not_let_go(tmp_path: Path) -> None:
+def test_sides_that_are_not_open_hold_the_ground(tmp_path: Path) -> None:
     run = sb.run(heap(stages=[sb.Gravity(), sb.RunOut(0.2)]), tmp_path / "out")
     assert np.abs(run.field("displacement", stage="run-out")).max() < 1e-4
 
 
-def test_a_slope_that_stands_goes_on_standing(tmp_path: Path) -> None:
-    """Beside free-field columns, half under water and half held by suction: shaken a little, then let go."""
+def test_a_stable_slope_stays_stable(tmp_path: Path) -> None:
+    """Beside free-field columns, half under water, half held by suction: shaken a little, then a run-out."""
     shaking = sb.Shaking(sb.Motion.ricker(2.0, 0.05), duration=1.5)
     run = sb.run(slope(sb.Gravity(), shaking, sb.RunOut(1.0)), tmp_path / "out")
     apart = run.field("displacement") - run.field("displacement", stage="shaking")
@@ -103,7 +103,7 @@ def test_a_slope_that_stands_goes_on_standing(tmp_path: Path) -> None:
     )
 
 
-def test_only_ground_that_flows_pays_for_it() -> None:
+def test_only_a_run_out_has_its_cost() -> None:
     simulation = sb.Simulation(heap(stages=[sb.Gravity(), sb.Shaking(duration=0.1)]))
     simulation.begin_next_stage()
     assert "run_out" not in simulation.arrays()
@@ -124,7 +124,7 @@ def test_only_ground_that_flows_pays_for_it() -> None:
     ],
 )
 def test_soil_above_the_water_is_partly_saturated(stages: list[object], expected: tuple[bool, str]) -> None:
-    """Suction acts on its grains in every stage, also where its water stays."""
+    """Suction acts on the skeleton in every stage, also where water does not flow."""
     (fact,) = [fact for fact in slope(*stages).active_physics() if fact.name == "partial saturation"]
     assert (fact.on, fact.why) == expected
 
@@ -134,6 +134,6 @@ def test_a_scene_that_flows_is_written_and_read() -> None:
     assert sb.Scene.from_toml(scene.to_toml()) == scene
 
 
-def test_ground_that_has_flowed_is_shaken_no_more() -> None:
+def test_ground_cannot_be_shaken_after_a_run_out() -> None:
     with pytest.raises(InvalidInput, match=r"stages\[1\]\.kind = 'run-out': must be the last stage"):
         heap(stages=[sb.Gravity(), sb.RunOut(1.0), sb.Shaking(duration=1.0)])

@@ -1,4 +1,4 @@
-"""What an earthquake does to saturated ground.
+"""Simulation of saturated ground in earthquakes.
 
 Stress-particle SPH with coupled pore water and PM4Sand. Units kN, m, s, Mg; x horizontal, y up; stresses and
 pressures reported to people are positive in compression. Start with :class:`Scene` and :func:`run`.

@@ -18,7 +18,7 @@ _R = TypeVar("_R")
 
 
 def checked(owner: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
-    """Check a function's arguments against its annotations, and refuse them as those of a scene are refused.
+    """Check a function's arguments against its annotations; refusals are as those of a scene.
 
     The function raises :class:`InvalidInput` with a path such as ``lab.cyclic_dss.csr``, which begins with
     `owner`. An unknown keyword is reported with the nearest right one. An argument without an annotation, as

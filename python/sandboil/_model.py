@@ -31,7 +31,7 @@ class Model(BaseModel):
                 f"{self._label}({type(self).__name__})",
                 args,
                 f"takes {len(self._positional)} positional arguments, {len(args)} were given",
-                f"name the rest: {', '.join(self._keys())}",
+                f"give the rest by name: {', '.join(self._keys())}",
             )
         for name, value in [
             *zip(self._positional, args, strict=False),

@@ -1,4 +1,4 @@
-"""What is computed: every scene, and what is asked of a run or of the laboratory beside a scene."""
+"""The cases: all scenes, further uses of runs, and laboratory tests."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from .quantities import Found, of_ground, of_run, of_stage, of_test, planned, te
 
 @dataclass(frozen=True)
 class Result:
-    """Bits of a case, and what a plan says of it: sizes and words, which may change while the bits stay."""
+    """Bits of a case, and the sizes and texts of its plan, which may change while the bits stay."""
 
     bits: Found
     plan: Found = field(default_factory=dict)
 
 
-# A case is computed with so many threads in a folder of its own.
+# Computes a case with so many threads in a given folder.
 Case = Callable[[int, Path], Result]
 
 
@@ -161,25 +161,25 @@ def _columns_read(threads: int, folder: Path) -> Result:
 
 
 def _plan(threads: int, folder: Path) -> Result:
-    """What a plan says that does not depend on the clock."""
-    plan: Found = {}
+    """The part of a plan that does not depend on the clock."""
+    found: Found = {}
     for name in ("undrained pond", "column and wall", "dry heap"):
-        told = scenes.ALL[name](folder).plan()
-        plan[name] = {
-            "nodes": told.nodes,
-            "stress nodes": told.stress_nodes,
-            "pairs": told.pairs,
-            "file size": told.file_size,
-            "physics": text_digest(told.physics),
-            **{f"bytes {array}": size for array, size in told.arrays.items()},
-            **{f"coefficient {region}": value(b) for region, b in told.pore_pressure_coefficients.items()},
-            **{f"time step {stage.name}": value(stage.dt) for stage in told.stages},
+        plan = scenes.ALL[name](folder).plan()
+        found[name] = {
+            "nodes": plan.nodes,
+            "stress nodes": plan.stress_nodes,
+            "pairs": plan.pairs,
+            "file size": plan.file_size,
+            "physics": text_digest(plan.physics),
+            **{f"bytes {array}": size for array, size in plan.arrays.items()},
+            **{f"coefficient {region}": value(b) for region, b in plan.pore_pressure_coefficients.items()},
+            **{f"time step {stage.name}": value(stage.dt) for stage in plan.stages},
         }
-    return Result({}, plan)
+    return Result({}, found)
 
 
 class Hooke:
-    """A model of a user's own."""
+    """A model written by a user."""
 
     def initialise(self, stress: Any, void_ratio: float | None) -> Any:
         return stress

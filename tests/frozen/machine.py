@@ -16,7 +16,7 @@ from .quantities import digest
 
 COUNT = 2001
 
-# Python calls the mathematical library that the core calls. (math.hypot is Python's own: it tells nothing.)
+# Python calls the mathematical library that the core calls. (math.hypot is excluded: it is part of Python.)
 ONE_ARGUMENT: list[tuple[Callable[[float], float], float, float]] = [
     (math.exp, -30.0, 30.0),
     (math.expm1, -2.0, 2.0),

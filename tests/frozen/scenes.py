@@ -500,7 +500,7 @@ def wet_heap(folder: Path) -> sb.Scene:
 
 
 def flowing_clay(folder: Path) -> sb.Scene:
-    """A block of clay let go to the left in air, in a repetition of nothing."""
+    """Run-out of a block of clay to the left in air; nothing is repeated."""
     return sb.Scene(
         spacing=0.25,
         regions=[
@@ -646,7 +646,7 @@ def corrected_slope(folder: Path) -> sb.Scene:
 
 
 def inclined_run_out(folder: Path) -> sb.Scene:
-    """Wet sand on an inclined base that absorbs, shaken both ways and then let go at its foot."""
+    """Wet sand on an inclined base that absorbs, shaken in both directions, then a run-out at its foot."""
     return sb.Scene(
         spacing=0.25,
         water=sb.Water(),
@@ -678,7 +678,7 @@ def inclined_run_out(folder: Path) -> sb.Scene:
 
 
 def repeated_run_out(folder: Path) -> sb.Scene:
-    """A berm that is repeated on both sides and flows, in water that stands nowhere."""
+    """Run-out of a berm between periodic sides, without still water."""
     return sb.Scene(
         spacing=0.25,
         water=sb.Water(),

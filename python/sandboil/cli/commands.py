@@ -39,7 +39,7 @@ EXIT_STOPPED = 3
 EXIT_INTERRUPTED = 130
 
 app = typer.Typer(
-    help="What an earthquake does to saturated ground.",
+    help="Simulation of saturated ground in earthquakes.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -49,13 +49,13 @@ app.add_typer(lab.app, name="lab")
 
 SceneFile = Annotated[Path, typer.Argument(help="Scene as a TOML file.", metavar="SCENE")]
 MotionOption = Annotated[
-    Path | None, typer.Option("--motion", help="Shake by this record (.AT2 or CSV) instead of the scene's.")
+    Path | None, typer.Option("--motion", help="Record (.AT2 or CSV) that replaces the motion of the scene.")
 ]
 RunKindOption = Annotated[
     Kind | None, typer.Option("--kind", help="Place for which the --motion is given; default outcrop.")
 ]
 ThreadsOption = Annotated[int, typer.Option(help="Threads; the results do not depend on their number.")]
-AccuracyOption = Annotated[Accuracy, typer.Option(help="Fills the numerics that the scene leaves open.")]
+AccuracyOption = Annotated[Accuracy, typer.Option(help="Preset for numerics that the scene does not set.")]
 
 
 def _scene(path: Path, motion: Path | None, unit: str | None, column: str | None, kind: Kind | None) -> Scene:
@@ -85,7 +85,9 @@ def plan(
 @app.command()
 def run(
     scene: SceneFile,
-    out: Annotated[Path, typer.Option(help="Folder for the results; must not hold a run but to resume.")],
+    out: Annotated[
+        Path, typer.Option(help="Folder for the results; it may contain a run only with --resume.")
+    ],
     motion: MotionOption = None,
     unit: UnitOption = None,
     column: ColumnOption = None,
@@ -93,7 +95,7 @@ def run(
     accuracy: AccuracyOption = "standard",
     threads: ThreadsOption = 2,
     columns: Annotated[
-        Path | None, typer.Option(help="Folder of a run whose free-field columns are read again.")
+        Path | None, typer.Option(help="Folder of a run whose free-field columns are read, not computed.")
     ] = None,
     keep_columns: Annotated[
         bool, typer.Option("--keep-columns", help="Keep the free-field columns for other runs.")
@@ -154,7 +156,7 @@ def _warn(
 def plot(
     folder: Annotated[Path, typer.Argument(help="Folder of a run.", metavar="DIR")],
     reference: Annotated[
-        Path | None, typer.Option(help="Folder with another code's results in CSV, to lay over.")
+        Path | None, typer.Option(help="Folder with CSV results of another code, drawn in the same plots.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the pictures, default plots in DIR.")] = None,
     stage: Annotated[str | None, typer.Option(help="A shaking stage, default the last.")] = None,

@@ -32,13 +32,17 @@ SoilOption = Annotated[
 SigmaOption = Annotated[float, typer.Option("--sigma-v0", help="Vertical effective stress, kPa.")]
 K0Option = Annotated[float, typer.Option("--K0", help="Horizontal over vertical effective stress.")]
 BiasOption = Annotated[float, typer.Option(help="Static shear stress over sigma_v0.")]
-VoidRatioOption = Annotated[float | None, typer.Option(help="At the start; default the soil's own.")]
-IntegratorOption = Annotated[Integrator, typer.Option(help="Of rate-type models.")]
-PlotOption = Annotated[Path | None, typer.Option(help="Picture, PNG, PDF or SVG.", callback=picture_to_write)]
+VoidRatioOption = Annotated[
+    float | None, typer.Option(help="Void ratio at the start; default that of the soil.")
+]
+IntegratorOption = Annotated[Integrator, typer.Option(help="Integration method of rate equations.")]
+PlotOption = Annotated[
+    Path | None, typer.Option(help="File for the picture: PNG, PDF or SVG.", callback=picture_to_write)
+]
 StopOption = Annotated[float, typer.Option(help="Shear strain that ends a cyclic test.")]
 MaxCyclesOption = Annotated[int, typer.Option(help="Cycles that end a cyclic test.")]
 CyclesOption = Annotated[float, typer.Option(help="Uniform cycles, counted by halves.")]
-OutOption = Annotated[Path | None, typer.Option(help="CSV for the record.", callback=to_write)]
+OutOption = Annotated[Path | None, typer.Option(help="CSV file for the measurements.", callback=to_write)]
 
 
 @app.command()
@@ -48,8 +52,12 @@ def dss(
     hpo: HpoOption = None,
     soil: SoilOption = None,
     csr: Annotated[float | None, typer.Option(help="Cyclic shear stress over sigma_v0.")] = None,
-    monotonic: Annotated[bool, typer.Option("--monotonic", help="Shear one way instead.")] = False,
-    drained: Annotated[bool, typer.Option("--drained", help="Hold the stress, not the volume.")] = False,
+    monotonic: Annotated[
+        bool, typer.Option("--monotonic", help="Monotonic shear instead of cyclic.")
+    ] = False,
+    drained: Annotated[
+        bool, typer.Option("--drained", help="Constant vertical stress instead of constant volume.")
+    ] = False,
     sigma_v0: SigmaOption = 101.3,
     K0: K0Option = 0.5,
     static_shear_ratio: BiasOption = 0.0,
@@ -100,14 +108,16 @@ def cell(
     void_ratio: VoidRatioOption = None,
     gamma_stop: StopOption = 0.05,
     max_cycles: MaxCyclesOption = 60,
-    spacing: Annotated[float, typer.Option(help="Between particles, m.")] = 0.01,
-    inertia: Annotated[float, typer.Option(help="Its share of the confining stress: accuracy.")] = 0.002,
+    spacing: Annotated[float, typer.Option(help="Particle spacing, m.")] = 0.01,
+    inertia: Annotated[
+        float, typer.Option(help="Inertial over confining stress; smaller is more accurate, slower.")
+    ] = 0.002,
     integrator: IntegratorOption = "default",
     threads: Annotated[int, typer.Option(help="Threads; the results do not depend on their number.")] = 1,
     out: OutOption = None,
     plot: PlotOption = None,
 ) -> None:
-    """Cyclic simple shear of a block of particles with a free centre, in minutes; prints as dss does."""
+    """Cyclic simple shear of a block of particles with a free centre, in minutes; prints as `lab dss`."""
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
         row = bar.add_task("cycles", total=max_cycles)
@@ -179,8 +189,8 @@ def calibrate(
     Dr: DrOption = None,
     G0: G0Option = None,
     crr: Annotated[float | None, typer.Option(help="Cyclic resistance ratio to meet.")] = None,
-    spt: Annotated[float | None, typer.Option(help="(N1)60cs, for what is not given.")] = None,
-    cpt: Annotated[float | None, typer.Option(help="q_c1Ncs, for what is not given.")] = None,
+    spt: Annotated[float | None, typer.Option(help="(N1)60cs, to estimate missing values.")] = None,
+    cpt: Annotated[float | None, typer.Option(help="q_c1Ncs, to estimate missing values.")] = None,
     cycles: CyclesOption = 15.0,
     gamma_sa: Annotated[float, typer.Option(help="Single-amplitude shear strain to reach.")] = 0.03,
     sigma_v0: SigmaOption = 101.3,
@@ -190,7 +200,7 @@ def calibrate(
     integrator: IntegratorOption = "default",
     out: Annotated[
         Path | None,
-        typer.Option(help="TOML for the material, as a scene and --soil take it.", callback=to_write),
+        typer.Option(help="TOML file for the material, which scenes and --soil read.", callback=to_write),
     ] = None,
     plot: PlotOption = None,
 ) -> None:

@@ -12,7 +12,7 @@ from ..scene.scene import Scene
 from ..site import CurveChoice, Place, deconvolution
 from .outputs import motion_to_write
 
-app = typer.Typer(help="Look at ground motions and convert them.", no_args_is_help=True)
+app = typer.Typer(help="Measure, convert and deconvolve ground motions.", no_args_is_help=True)
 
 UnitOption = Annotated[
     str | None,
@@ -28,7 +28,7 @@ KindOption = Annotated[Kind, typer.Option(help="Place for which the motion is gi
 def info(
     file: MotionFile, unit: UnitOption = None, column: ColumnOption = None, kind: KindOption = "outcrop"
 ) -> None:
-    """Print the measures of a motion."""
+    """Print peak values, duration and other measures of a motion."""
     motion = Motion.from_file(file, unit=unit, column=column, kind=kind)
     for name, value, symbol in (
         ("kind", motion.kind, ""),
@@ -51,7 +51,7 @@ def spectrum(
     unit: UnitOption = None,
     column: ColumnOption = None,
     kind: KindOption = "outcrop",
-    damping: Annotated[float, typer.Option(help="Fraction of critical.")] = 0.05,
+    damping: Annotated[float, typer.Option(help="Damping ratio, fraction of critical.")] = 0.05,
 ) -> None:
     """Print the pseudo-acceleration response spectrum as CSV."""
     response = Motion.from_file(file, unit=unit, column=column, kind=kind).response_spectrum(damping)
@@ -82,15 +82,19 @@ def convert(
 @app.command()
 def deconvolve(
     file: MotionFile,
-    scene: Annotated[Path, typer.Option(help="Scene whose ground the record stood on.")],
+    scene: Annotated[Path, typer.Option(help="Scene of the ground at the recording station.")],
     out: MotionOut,
     unit: UnitOption = None,
     column: ColumnOption = None,
     kind: KindOption = "outcrop",
-    x: Annotated[float | None, typer.Option(help="Where it stood, m; default the middle.")] = None,
-    at: Annotated[Place, typer.Option(help="At which end of the ground it stood.")] = "surface",
-    curves: Annotated[CurveChoice, typer.Option(help="Stiffness and damping over strain.")] = "darendeli",
-    linear: Annotated[bool, typer.Option("--linear", help="Keep the stiffness of small strain.")] = False,
+    x: Annotated[
+        float | None, typer.Option(help="Place of the station, m; default the middle of the section.")
+    ] = None,
+    at: Annotated[Place, typer.Option(help="Depth of the station.")] = "surface",
+    curves: Annotated[
+        CurveChoice, typer.Option(help="Curves of stiffness and damping against strain.")
+    ] = "darendeli",
+    linear: Annotated[bool, typer.Option("--linear", help="Keep the small-strain stiffness.")] = False,
     max_frequency: Annotated[float | None, typer.Option(help="Remove frequencies above this, Hz.")] = None,
 ) -> None:
     """Find the outcrop motion at the base of a scene from a record at its surface; print strains."""

@@ -23,7 +23,7 @@ def read_bytes(path: str | os.PathLike[str], label: str, form: str) -> bytes:
         # A name with a zero byte is a ValueError.
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InvalidInput(
-            label, name, f"must be a readable {form}: {reason}", "check the path and its rights"
+            label, name, f"must be a readable {form}: {reason}", "check the path and its permissions"
         ) from error
     if len(content) > MAX_FILE_BYTES:
         raise InvalidInput(

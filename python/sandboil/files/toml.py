@@ -28,7 +28,10 @@ def parse(text: str, label: str, origin: str) -> dict[str, Any]:
     if found := _DEEP_KEY.search(text):
         line = text.count("\n", 0, found.start()) + 1
         raise InvalidInput(
-            label, origin, f"must have keys of at most {MAX_KEY_PARTS} parts (at line {line})", "write tables"
+            label,
+            origin,
+            f"must have keys of at most {MAX_KEY_PARTS} parts (at line {line})",
+            "write tables instead",
         )
     try:
         return tomllib.loads(text)

@@ -188,7 +188,7 @@ class Envelopes:
 
 
 class Seepage:
-    """Where the water of a seepage stage ends: fields by their names, and sums of each condition."""
+    """Water at the end of a seepage stage: fields by their names, and the flow at each condition."""
 
     GROUP = "seepage"
     DISCHARGE = Dataset("seepage/discharge", "m3/s per m")

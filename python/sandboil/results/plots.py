@@ -125,7 +125,7 @@ def _is_run_out(run: Run, stage: str) -> bool:
 
 
 def run_out(run: Run, *, stage: str | None = None) -> Figure:
-    """A run-out: the ground at the beginning, when it moved fastest, and at the end."""
+    """Draw a run-out: the ground at the start, at the largest velocity, and at the end."""
     stage = _shaken_stage(run, stage)
     history, times = run.energy(stage), run.frame_times(stage)
     fastest = float(history["time"][np.argmax(history["kinetic"])])

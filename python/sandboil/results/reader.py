@@ -88,7 +88,7 @@ class Run:
         self.path = Path(folder) / FILE_NAME
         if not self.path.is_file():
             raise InvalidInput(
-                "folder", os.fspath(folder), f"must hold a {FILE_NAME}", "made by sandboil run"
+                "folder", os.fspath(folder), f"must contain a {FILE_NAME}", "give the folder of a run"
             )
         with self._open() as file:
             refuse_foreign(file, "results")

@@ -55,7 +55,7 @@ def _table(path: Path) -> dict[str, Floats]:
         raise InvalidInput(
             "reference",
             str(path),
-            f"must have {len(names)} columns as its header has, not {values.shape[1]}",
+            f"must have {len(names)} columns as its header, not {values.shape[1]}",
             "see sandboil.results.reference.Reference",
         )
     return dict(zip(names, values.T, strict=True))

@@ -73,7 +73,7 @@ class Stored:
 
 
 def refuse_intervals(seconds: float | None, interval: float | None) -> None:
-    """Refuse times between states, as of :class:`Keeper`, that are not positive."""
+    """Refuse checkpoint intervals, as of :class:`Keeper`, that are not positive."""
     for name, value in (("checkpoint_seconds", seconds), ("checkpoint_time", interval)):
         if value is not None and not 0.0 < value < math.inf:
             raise InvalidInput(
@@ -113,7 +113,7 @@ class Keeper:
 
     @property
     def is_due(self) -> bool:
-        """Whether it is time for the next state."""
+        """Whether the next checkpoint is due."""
         return time.monotonic() - self._clock >= self._seconds or self._intervals > self._passed
 
     @property

@@ -133,7 +133,7 @@ def _refuse_unusable(folder: Path, resume: bool) -> None:
             "out",
             str(folder),
             f"must not hold a run, but has {found[0]}",
-            "choose another, remove it, or resume that run",
+            "choose another folder, remove it, or resume that run",
         )
     if resume and FILE_NAME not in found and twin_of(path).name not in found:
         raise InvalidInput(
@@ -145,20 +145,20 @@ def _refuse_unusable(folder: Path, resume: bool) -> None:
     existing = next(place for place in [folder, *folder.absolute().parents] if place.exists())
     if not existing.is_dir():
         raise InvalidInput(
-            "out", str(folder), f"must be a folder, but {existing} is a file", "choose another"
+            "out", str(folder), f"must be a folder, but {existing} is a file", "choose another folder"
         )
     if not os.access(existing, os.W_OK | os.X_OK):
         raise InvalidInput(
             "out",
             str(folder),
             f"must be writable, but {existing} is not",
-            "choose another or change its rights",
+            "choose another folder or change its permissions",
         )
 
 
 def _unwritable(folder: Path, error: OSError) -> InvalidInput:
     return InvalidInput(
-        "out", str(folder), f"must be writable: {error}", "choose another or change its rights"
+        "out", str(folder), f"must be writable: {error}", "choose another folder or change its permissions"
     )
 
 

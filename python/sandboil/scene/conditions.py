@@ -160,7 +160,9 @@ class _EdgeCondition(_Condition):
                 "condition.x", self.x, "cuts the 'surface' or the 'base'", "other lines are given by points"
             )
         if not self.x[0] < self.x[1]:
-            raise InvalidInput("condition.x", self.x, "must rise", "order: left end, right end")
+            raise InvalidInput(
+                "condition.x", self.x, "must be (left, right) with left < right", "the left end comes first"
+            )
         return self
 
     def line(self, outline: Outline) -> BaseGeometry:

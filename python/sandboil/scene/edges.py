@@ -107,7 +107,10 @@ class BaseSegment(Model):
     def _not_empty(self) -> BaseSegment:
         if self.x[1] - self.x[0] <= COORDINATE_TOLERANCE:
             raise InvalidInput(
-                "segment.x", self.x, "must rise, else the segment is empty", "order: left end, right end"
+                "segment.x",
+                self.x,
+                "must be (left, right) with left < right, else the segment is empty",
+                "the left end comes first",
             )
         return self
 

@@ -1,4 +1,4 @@
-"""The numbers of the method."""
+"""Parameters of the numerical method."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ from .region import Region
 from .stages import AnyStage, Gravity, RunOut, Seepage, Shaking, Stage
 from .water import Water, WaterTable
 
-_REGIONS: JsonDict = {"remedy": "regions of one soil can be one polygon"}
+_REGIONS: JsonDict = {"remedy": "join regions of the same soil in one polygon"}
 _STAGES: JsonDict = {"remedy": "for example Gravity() and Shaking(motion)"}
 
 
@@ -154,7 +154,7 @@ class Scene(Model):
             raise InvalidInput(
                 "scene.stages",
                 self.stage_names,
-                "must hold a shaking stage with a motion for another to replace it",
+                "must contain a shaking stage with a motion, which the given motion replaces",
                 "give the stage a motion in the scene",
             )
         for i, stage in shaken:

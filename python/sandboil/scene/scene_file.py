@@ -27,7 +27,7 @@ def write(text: str, path: str | Path) -> None:
         Path(path).write_text(text, encoding="utf-8")
     except OSError as error:
         raise InvalidInput(
-            "path", str(path), f"must be writable: {error.strerror}", "check folder and rights"
+            "path", str(path), f"must be writable: {error.strerror}", "check the folder and its permissions"
         ) from error
 
 

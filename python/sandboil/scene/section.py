@@ -33,7 +33,7 @@ def joined(shapes: tuple[Box | Polygon, ...]) -> BaseGeometry:
 
 @functools.lru_cache(maxsize=8)
 def outlined(shapes: tuple[Box | Polygon, ...]) -> Outline:
-    """Edges of the section that shapes make together."""
+    """Outline of the section that consists of the shapes."""
     return Outline.of(joined(shapes))
 
 

@@ -28,10 +28,10 @@ _TENSION: JsonDict = {"remedy": "leave it out for the apex c/tan(phi), 0 for soi
 _SOFTENING: JsonDict = {"remedy": "a shear strain, not a percentage: 5 % is written 0.05"}
 _EXPONENT: JsonDict = {"remedy": "about 0.5 for sand; 0 is Elastic"}
 _MODULUS: JsonDict = {"remedy": "soils have 1e4 to 1e6 kPa; 50 MPa is written 5e4"}
-_RESIDUAL_PART: JsonDict = {"remedy": "at most the peak's; leave it out to keep that"}
-_SECONDARY: JsonDict = {"remedy": "leave it out for the model's own"}
+_RESIDUAL_PART: JsonDict = {"remedy": "at most the peak value, which is the default"}
+_SECONDARY: JsonDict = {"remedy": "leave it out for the default of the model"}
 _UNDRAINED: JsonDict = {"remedy": "for strength that grows with pressure take DruckerPrager or MohrCoulomb"}
-_RESIDUAL: JsonDict = {"remedy": "leave it out for strength that stays"}
+_RESIDUAL: JsonDict = {"remedy": "leave it out for a soil that does not soften"}
 # Largest void ratio of any soil that carries load; above it the entry is a slip of units.
 _VOID_RATIO_MAX = 10.0
 # Largest critical-state friction angle of any sand, degrees; above it the entry is a slip of units.
@@ -163,7 +163,7 @@ class PM4Sand(Model):
 
     @classmethod
     def from_density(cls, Dr: float, **options: Any) -> PM4Sand:
-        """Sand of a relative density; else as :meth:`from_spt` of (N1)60cs = 46 Dr^2."""
+        """Sand of a relative density; all else as :meth:`from_spt` for (N1)60cs = 46 Dr^2."""
         return calibrated_sand({"Dr": Dr}, options)
 
     @model_validator(mode="after")
@@ -343,7 +343,7 @@ def _require_softening_strain(residual: dict[str, float | None], softening_strai
             "material.softening_strain",
             softening_strain,
             f"needs a residual strength: {', '.join(residual)}",
-            "leave it out for strength that stays",
+            "leave it out for a soil that does not soften",
         )
 
 

@@ -276,10 +276,10 @@ class RunOut(_Stage):
 
     `open_sides` are removed, as a gate is, and the base continues beyond them. `viscosity` is Monaghan's
     coefficient of the forces between particles that approach each other. `still_water` is the surface of
-    the water around the ground, (x, y) from left to right, level beyond its ends; left out, that of the state
-    at rest, ponds and water table; empty, there is none. Pore pressure beyond its hydrostatic pressure drains
-    through the free surface, which moves with the ground. Soil above the water keeps its suction and its
-    water.
+    the water around the ground, (x, y) from left to right, level beyond its ends; the default is the water
+    surface at rest, with ponds; with no points there is no water. Pore pressure above the hydrostatic
+    pressure of this water drains through the free surface, which moves with the ground. Soil above the
+    water keeps its suction and its water content.
     """
 
     _positional: ClassVar[tuple[str, ...]] = ("duration",)

@@ -15,7 +15,9 @@ from .._errors import InvalidInput
 from .._model import Model
 from .._types import MAX_PARTS, Floats, Many, NonNegative, Number, Point, Positive
 
-_LAYERS: JsonDict = {"remedy": "layered soils have several times less across their layers, but not zero"}
+_LAYERS: JsonDict = {
+    "remedy": "layered soils are several times less permeable across their layers, but not impermeable"
+}
 
 
 class Water(Model):

@@ -29,7 +29,7 @@ pub struct Phases {
 }
 
 impl Phases {
-    /// The undeformed section.
+    /// Phases of the undeformed section.
     pub fn new(model: &Model) -> Self {
         let volume = model.volume.clone();
         let of_region = |value: &dyn Fn(&crate::section::description::Region) -> f64| -> Vec<f64> {

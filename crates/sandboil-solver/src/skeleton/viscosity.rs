@@ -1,6 +1,6 @@
 //! Artificial viscosity of Monaghan (1983, J. Comput. Phys. 52, 374-389): slows nodes that approach each
 //! other, so that they do not form pairs. The forces act along the line between two nodes, conserve linear
-//! and angular momentum, and only take energy.
+//! and angular momentum, and dissipate energy.
 
 use crate::{
     parallel::{Rows, chunks, for_each_chunk},

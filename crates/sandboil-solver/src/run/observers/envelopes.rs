@@ -2,7 +2,7 @@
 
 use crate::{run::ground::Ground, skeleton::point::maximum_shear_strain, stages::stage::Output};
 
-/// Envelopes of a stage; every step counts.
+/// Envelopes over all steps of a stage.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Envelopes {
     /// Largest excess pore pressure of every node, kPa, if it is recorded.
