@@ -154,7 +154,7 @@ class Scene(Model):
             raise InvalidInput(
                 "scene.stages",
                 self.stage_names,
-                "must contain a shaking stage with a motion, which the given motion replaces",
+                "must hold a shaking stage with a motion, which the given motion replaces",
                 "give the stage a motion in the scene",
             )
         for i, stage in shaken:
