@@ -64,8 +64,8 @@ pub struct Flow {
     ties: Vec<SurfaceNode>,
     /// Those that are tied: where an edge condition takes its inflow, water does not drain at the surface.
     surface: Vec<SurfaceNode>,
-    /// Share of each node's excess pressure in the force: none of a node tied to the surface, all of the others.
-    push: Vec<f64>,
+    /// Whether a node's excess pressure acts in the force: not that of a node that has been tied to the surface.
+    pushes: Vec<bool>,
     /// `div (k grad H)` at velocity nodes, 1/s per m of head (Eq. 3); none if undrained.
     diffusion: Option<Csr<f64>>,
     inverse_volume: Vec<f64>,
@@ -191,7 +191,7 @@ impl Flow {
             unit_weight: water.unit_weight,
             ties,
             surface: Vec::new(),
-            push: vec![1.0; model.nodes()],
+            pushes: vec![true; model.nodes()],
             diffusion: None,
             inverse_volume: Vec::new(),
             edges,
@@ -380,7 +380,8 @@ impl Flow {
             Scheme::Implicit { factors: Some(factors) } => factors.bytes(),
             _ => 0,
         };
-        6 * size_of_val(self.excess.as_slice())
+        5 * size_of_val(self.excess.as_slice())
+            + self.pushes.len()
             + size_of_val(self.mobility.as_slice())
             + size_of_val(self.cofactor.as_slice())
             + self.diffusion.as_ref().map_or(0, Csr::bytes)
@@ -507,7 +508,8 @@ impl Flow {
     fn update_felt(&mut self) {
         for node in 0..self.felt.len() {
             let outside = self.outside(node);
-            self.felt[node] = outside + self.push[node] * (self.neutral(node) - outside);
+            self.felt[node] =
+                if self.pushes[node] { outside + (self.neutral(node) - outside) } else { outside };
         }
     }
 }

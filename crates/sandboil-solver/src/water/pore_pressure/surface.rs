@@ -38,7 +38,7 @@ impl Flow {
         let is_sealed = |tie: &SurfaceNode| self.edges.as_ref().is_some_and(|edges| edges.seals(tie.node));
         self.surface = self.ties.iter().copied().filter(|tie| !is_sealed(tie)).collect();
         for tie in &self.surface {
-            self.push[tie.node as usize] = 0.0;
+            self.pushes[tie.node as usize] = false;
         }
     }
 
