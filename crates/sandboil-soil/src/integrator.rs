@@ -6,7 +6,7 @@
 pub enum Integrator {
     /// Two-stage modified Euler with error control (Sloan, Abbo and Sheng 2001).
     ModifiedEuler {
-        /// Relative error allowed per sub-step; 1e-5 to 1e-4.
+        /// Error of the stress allowed per sub-step, relative to the stress; 1e-6 to 1e-4.
         tolerance: f64,
         /// Largest strain component of a committed part.
         max_increment: f64,
@@ -27,8 +27,8 @@ impl Integrator {
     /// Default largest strain component of a committed part. Load reversals are detected once per part. With parts
     /// above 5e-6, a path that turns nearly tangentially shows false reversals (`docs/theory/pm4sand.md`).
     pub const DEFAULT_INCREMENT: f64 = 5e-6;
-    /// Default relative error per sub-step.
-    pub const DEFAULT_TOLERANCE: f64 = 1e-5;
+    /// Default relative error per sub-step: a thousand cycles at a stress ratio of 0.02 lose the same pressure within 0.5 %.
+    pub const DEFAULT_TOLERANCE: f64 = 3e-5;
 
     /// Largest strain component of a committed part.
     pub fn max_increment(&self) -> f64 {

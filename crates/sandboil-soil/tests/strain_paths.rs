@@ -107,7 +107,7 @@ fn a_negligible_shear_strain_changes_the_result_of_biaxial_cycles() {
     let step = Integrator::DEFAULT_INCREMENT;
     let p = |forward: f64, back: f64| biaxial_cycles_with_shear([forward, back], &integrator, step);
     assert!((p(0.0, 0.0) - 56.0).abs() < 0.1, "{}", p(0.0, 0.0));
-    for (back, expected) in [(0.1e-12, 55.8), (0.2e-12, 82.5), (1.3e-12, 39.3)] {
+    for (back, expected) in [(0.1e-12, 39.3), (0.2e-12, 82.5), (1.3e-12, 39.3)] {
         assert!((p(1e-12, back) - expected).abs() < 0.1, "{back}: {} kPa", p(1e-12, back));
     }
 }

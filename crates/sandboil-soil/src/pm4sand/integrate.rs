@@ -11,7 +11,7 @@ use super::{
     surfaces::{elastic_increment, stress_ratio},
 };
 use crate::{Deviator, Integrator, UpdateReport};
-use std::f64::consts::FRAC_1_SQRT_2;
+use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 /// Lower limit of the mean stress (the pressure floor), relative to `p_min`.
 const FLOOR_FRACTION: f64 = 0.2;
@@ -30,8 +30,8 @@ const MILDEST_CUT: f64 = 0.5;
 /// Largest Runge-Kutta sub-step, relative to the strain `m p/G`. At a ratio of two the result is wrong without a
 /// warning.
 const RK4_STABILITY: f64 = 0.5;
-/// Smallest reference stress of the relative error, relative to atmospheric pressure.
-const ERROR_SCALE: f64 = 1.0 / 200.0;
+/// Reference stress that is added to `sqrt(2) p` in the relative error, relative to atmospheric pressure.
+const ERROR_SCALE: f64 = 1.0 / 30.0;
 /// Largest number of iterations of the reference drift correction.
 const DRIFT_ITERATIONS: usize = 25;
 
@@ -58,11 +58,12 @@ enum Stages {
 
 impl Scheme {
     fn of(integrator: &Integrator) -> Self {
-        // At most a thousand sub-steps per part: if more are needed, the part is too long.
+        // At most a hundred sub-steps per part. Where more would be needed, the back-stress ratio alternates across the
+        // bounding surface, which no step resolves.
         let base = Self {
             stages: Stages::Two,
             tolerance: Integrator::DEFAULT_TOLERANCE,
-            smallest: 1e-3,
+            smallest: 1e-2,
             growth: 5.0,
             reference: false,
         };
@@ -275,8 +276,9 @@ impl PM4Sand {
         point
     }
 
-    /// Modified Euler with an error estimate: half the difference of the two stages, relative to the stress. The error
-    /// of the back-stress ratio is included, except in the reference scheme. `None` where a stage has no solution.
+    /// Modified Euler with an error estimate: half the difference of the two stages' stresses, relative to the stress. The
+    /// back-stress ratio has no error of its own: it stays within `m/sqrt(2)` of the stress ratio, so the error of the
+    /// stress controls it. `None` where a stage has no solution.
     #[inline]
     #[expect(clippy::too_many_arguments, reason = "the context of one sub-step")]
     fn two_stages(
@@ -298,14 +300,13 @@ impl PM4Sand {
         }
         let (dp, ds) = (second.p - first.p, second.s - first.s);
         let difference = (2.0 * dp * dp + ds.contract(ds)).sqrt();
-        let scale = point.stress_norm();
         let error = if scheme.reference {
+            let scale = point.stress_norm();
             // Below 0.5 kPa the error is absolute, in kPa; `unit` is one kPa in the unit of `p_atm`.
             let unit = self.constants.p_atm / 101.3;
             if scale < 0.5 * unit { difference / unit } else { 0.5 * difference / scale }
         } else {
-            let scale = scale.max(ERROR_SCALE * self.constants.p_atm);
-            (0.5 * difference / scale).max(0.5 * (second.alpha - first.alpha).norm())
+            0.5 * difference / (SQRT_2 * point.p + ERROR_SCALE * self.constants.p_atm)
         };
         Some(Attempt { point: end, error, loading_index: second.loading_index })
     }
