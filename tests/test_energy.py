@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import scenes
 from sandboil import (
+    CompliantBase,
     Elastic,
     FreeField,
     Gravity,
@@ -158,3 +159,24 @@ def test_counts_are_those_of_their_stage(finished: Run) -> None:
         assert summary[stage]["counts"]["steps"] == summary[stage]["steps"]
     assert summary["gravity"]["counts"]["plastic_updates"] == 0
     assert summary["shaking"]["counts"]["reversals"] > 0
+
+
+def test_weight_does_the_work_of_its_fall(tmp_path: Path) -> None:
+    """Under a vertical motion: the unit weight of a cell times the lowering of all cells."""
+    stages = [
+        Gravity(),
+        Shaking(scenes.PULSE, vertical=scenes.PULSE, base=CompliantBase(vertical="absorbing"), duration=0.4),
+    ]
+    output = Output(depths=[1.0], points=[], field_dt=0.2)
+    results = run(scenes.dry_column(stages=stages, output=output), tmp_path)
+    energy = results.energy()
+    lowered = -results.field("displacement")[:, 1]
+    cell = 20.0 * 0.25**2
+    fall = cell * lowered.sum()
+    assert abs(fall) > 0.1
+    assert energy["weight"][-1] == pytest.approx(fall, rel=1e-2)
+    # The reaction carries the whole weight at the base.
+    lowest = results.position[:, 1] < 0.25
+    assert energy["reaction"][-1] == pytest.approx(-cell * len(lowered) * lowered[lowest].mean(), rel=1e-2)
+    assert not energy["still_water"].any()
+    assert not energy["load"].any()
