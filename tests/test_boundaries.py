@@ -1,4 +1,4 @@
-"""Base, sides and how waves come to them: what a scene says of them, and what the core is given."""
+"""Base, sides and incoming waves: in a scene, and in its description for the core."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ BENCHES = [(0.0, 0.0), (40.0, 0.0), (40.0, 6.0), (26.0, 6.0), (14.0, 12.0), (0.0
 
 
 def slope(points: Any = BENCHES, **changes: Any) -> Scene:
-    said: dict[str, Any] = {
+    settings: dict[str, Any] = {
         "spacing": 1.0,
         "regions": [Region("ground", polygon(points), ROCK, dry_unit_weight=18.0)],
         "sides": FreeField(),
         "stages": [Gravity(), Shaking(PULSE, duration=1.0)],
     }
-    return Scene(**(said | changes))
+    return Scene(**(settings | changes))
 
 
 def shaken(*args: Any, **kwargs: Any) -> list[Gravity | Shaking]:
@@ -104,7 +104,7 @@ def test_edges_of_a_slope_between_benches() -> None:
     assert not outline.is_level
 
 
-def test_where_regions_meet_is_no_corner_of_the_base() -> None:
+def test_a_contact_of_regions_is_not_a_corner_of_the_base() -> None:
     parts = [Region(f"{x}", box(x=(x, x + 2), y=(0, 4)), ROCK, dry_unit_weight=18.0) for x in (0, 2, 4)]
     outline = slope(regions=parts).outline
     np.testing.assert_array_equal(outline.base, [(0, 0), (6, 0)])
@@ -144,7 +144,7 @@ PRONGS = [(0, 0), (40, 0), (40, 12), (0, 12), (0, 9), (10, 9), (10, 5), (0, 5)]
 
 
 @pytest.mark.parametrize(
-    ("points", "path", "told"),
+    ("points", "path", "allowed"),
     [
         (OVERHANGING, "scene.regions", "upright from (20, 0) to (20, 2)"),
         (STEPPED, "scene.regions", "upright from (20, 0) to (20, 2)"),
@@ -155,11 +155,13 @@ PRONGS = [(0, 0), (40, 0), (40, 12), (0, 12), (0, 9), (10, 9), (10, 5), (0, 5)]
     ],
 )
 @pytest.mark.parametrize("sides", [FreeField(), Fixed()])
-def test_outlines_that_cannot_be_computed_are_refused(points: Any, path: str, told: str, sides: Any) -> None:
+def test_outlines_that_cannot_be_computed_are_refused(
+    points: Any, path: str, allowed: str, sides: Any
+) -> None:
     with pytest.raises(InvalidInput) as refused:
         slope(points, sides=sides)
     assert refused.value.path == path
-    assert told in refused.value.allowed
+    assert allowed in refused.value.allowed
     assert refused.value.hint is not None
 
 
@@ -348,7 +350,7 @@ walls = st.sampled_from([FreeField(), Roller(), Fixed()])
     support=st.sampled_from(["no-slip", "free-slip"]),
     resolved=st.booleans(),
 )
-def test_toml_says_every_boundary(
+def test_every_boundary_can_be_written_in_toml(
     sides: Any, half_space: Any, arrival: Any, vertical: Any, support: Any, resolved: bool
 ) -> None:
     base = CompliantBase(**half_space, **arrival)
@@ -381,7 +383,7 @@ LATE = [BaseSegment((0, 20)), BaseSegment((20, 40), delay=1.5)]
 
 
 @pytest.mark.parametrize(
-    ("make", "path", "told"),
+    ("make", "path", "allowed"),
     [
         (lambda: CompliantBase(Vp=900.0), "base.Vp", "needs Vs and density"),
         (lambda: CompliantBase(Vs=400.0, density=2.1, Vp=500.0), "base.Vp", "at least 565.7 m/s"),
@@ -485,48 +487,48 @@ LATE = [BaseSegment((0, 20)), BaseSegment((20, 40), delay=1.5)]
         ),
     ],
 )
-def test_boundaries_that_contradict_are_refused(make: Any, path: str, told: str) -> None:
+def test_boundaries_that_contradict_are_refused(make: Any, path: str, allowed: str) -> None:
     with pytest.raises(InvalidInput) as refused:
         make()
     assert refused.value.path == path
-    assert told in refused.value.allowed
+    assert allowed in refused.value.allowed
 
 
 # Warnings
 
 
-def test_a_motion_that_does_not_end_at_rest_is_told() -> None:
+def test_a_motion_that_does_not_end_at_rest_gives_a_warning() -> None:
     drift = np.linspace(0.0, 0.2, len(PULSE.velocity))
     drifting = Motion(dt=PULSE.dt, velocity=PULSE.velocity + drift)
     scene = slope(stages=shaken(drifting))
-    (told,) = doubts(scene, loaded_motions(scene))
-    assert told.startswith("scene.stages[1].motion ends with a velocity of 0.2 m/s")
-    assert f"a drift of {drifting.displacement[-1]:.3g} m" in told
-    assert "baseline_corrected()" in told
+    (warning,) = doubts(scene, loaded_motions(scene))
+    assert warning.startswith("scene.stages[1].motion ends with a velocity of 0.2 m/s")
+    assert f"a drift of {drifting.displacement[-1]:.3g} m" in warning
+    assert "baseline_corrected()" in warning
     with pytest.warns(SandboilWarning, match="ends with a velocity"):
         Simulation(scene, threads=1)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         page = str(plan.plan(scene))
-    assert f"warning: {told}" in page
+    assert f"warning: {warning}" in page
     mended = slope(stages=shaken(drifting.baseline_corrected()))
     assert not doubts(mended, loaded_motions(mended))
 
 
-def test_a_smooth_base_that_is_not_level_is_told() -> None:
+def test_a_smooth_base_that_is_not_level_gives_a_warning() -> None:
     smooth = [Gravity(base="free-slip"), Shaking(duration=1.0)]
     scene = slope(inclined(5.0), stages=smooth)
-    (told,) = doubts(scene, loaded_motions(scene))
-    assert told.startswith("scene.stages[0].base = 'free-slip' above a base that is not level")
+    (warning,) = doubts(scene, loaded_motions(scene))
+    assert warning.startswith("scene.stages[0].base = 'free-slip' above a base that is not level")
     for sound in (slope(inclined(5.0)), slope(stages=smooth)):
         assert not doubts(sound, loaded_motions(sound))
 
 
-def test_a_stage_that_ends_before_a_delayed_motion_is_told() -> None:
+def test_a_stage_that_ends_before_a_delayed_motion_gives_a_warning() -> None:
     base = CompliantBase(segments=[BaseSegment((0, 20)), BaseSegment((20, 40), delay=0.4)])
     scene = slope(stages=shaken(PULSE, base=base, duration=1.0))
-    (told,) = doubts(scene, loaded_motions(scene))
-    assert "ends before the motion has passed the base from x = 20 to 40 m, which takes 1.15 s" in told
+    (warning,) = doubts(scene, loaded_motions(scene))
+    assert "ends before the motion has passed the base from x = 20 to 40 m, which takes 1.15 s" in warning
     open_ended = slope(stages=shaken(PULSE, base=base))
     assert not doubts(open_ended, loaded_motions(open_ended))
 
@@ -534,13 +536,13 @@ def test_a_stage_that_ends_before_a_delayed_motion_is_told() -> None:
 # Physics that is on
 
 
-def test_columns_waves_and_passage_are_told() -> None:
+def test_the_plan_lists_columns_waves_and_passage() -> None:
     def rows(scene: Scene) -> dict[str, tuple[bool, str]]:
         return {name: (on, reason) for name, on, reason in scene.active_physics()}
 
-    told = rows(slope())
-    assert told["free-field columns"] == (True, "on the left and right: 2 columns of 18 particles in all")
-    assert told["vertical waves"] == (False, "the base is a roller vertically")
+    facts = rows(slope())
+    assert facts["free-field columns"] == (True, "on the left and right: 2 columns of 18 particles in all")
+    assert facts["vertical waves"] == (False, "the base is a roller vertically")
     level = [(0, 0), (20, 0), (20, 6), (0, 6)]
     assert rows(slope(level))["free-field columns"][1] == "on the left and right: 1 column of 6 particles"
     passing = rows(slope(level, stages=shaken(PULSE, base=CompliantBase(apparent_velocity=900.0))))

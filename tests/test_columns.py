@@ -53,7 +53,7 @@ def test_a_run_on_kept_columns_is_the_run_that_kept_them(kept: sb.Run, tmp_path:
 
 
 def test_what_was_kept_is_what_is_read(kept: sb.Run, tmp_path: Path) -> None:
-    """Columns that moved half as much move the section less: they are not solved again."""
+    """Columns with half the motion move the section less, so they are read, not solved."""
     (tmp_path / FILE_NAME).write_bytes((kept.path.parent / FILE_NAME).read_bytes())
     with h5py.File(tmp_path / FILE_NAME, "a") as file:
         for hand in ("left", "right"):
@@ -84,7 +84,7 @@ def test_a_run_keeps_nothing_unless_it_is_asked(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("scene", "told"),
+    ("scene", "allowed"),
     [
         (ground(motion=MOTION.scaled(factor=1.01)), "other ground, motion or numerics"),
         (ground(numerics=sb.Numerics(velocity_filter=0.3)), "other ground, motion or numerics"),
@@ -95,12 +95,12 @@ def test_a_run_keeps_nothing_unless_it_is_asked(tmp_path: Path) -> None:
     ],
 )
 def test_columns_of_another_scene_are_refused(
-    kept: sb.Run, tmp_path: Path, scene: sb.Scene, told: str
+    kept: sb.Run, tmp_path: Path, scene: sb.Scene, allowed: str
 ) -> None:
     with pytest.raises(InvalidInput) as refused:
         sb.run(scene, tmp_path / "out", columns=kept.path.parent)
     assert refused.value.path == "columns"
-    assert told in refused.value.allowed
+    assert allowed in refused.value.allowed
     assert not (tmp_path / "out").exists()
 
 

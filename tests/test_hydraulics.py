@@ -1,4 +1,4 @@
-"""Seepage and partly saturated ground: what scenes say, the states they lead to, what runs keep of them."""
+"""Seepage and partly saturated ground: their scenes, their states, and their results."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ DISCHARGE = K * (HIGH**2 - LOW**2) / (2.0 * WIDTH)
 
 
 def soil(x: tuple[float, float], y: tuple[float, float], **changes: Any) -> Region:
-    said = {"hydraulic_conductivity": K, "retention": SAND, "Gs": GS, "porosity": POROSITY}
-    return Region("soil", box(x=x, y=y), SOIL, **(said | changes))
+    settings = {"hydraulic_conductivity": K, "retention": SAND, "Gs": GS, "porosity": POROSITY}
+    return Region("soil", box(x=x, y=y), SOIL, **(settings | changes))
 
 
 def dam(**changes: Any) -> Scene:
-    said: dict[str, Any] = {
+    settings: dict[str, Any] = {
         "spacing": 1.0,
         "water": Water(),
         "water_table": WaterTable(elevation=HIGH),
@@ -65,7 +65,7 @@ def dam(**changes: Any) -> Scene:
         "regions": [soil((0.0, WIDTH), (0.0, HIGH))],
         "stages": [Seepage([Reservoir("left", level=HIGH), Reservoir("right", level=LOW)])],
     }
-    return Scene(**(said | changes))
+    return Scene(**(settings | changes))
 
 
 def drawdown() -> Scene:
@@ -214,8 +214,8 @@ def test_a_drawdown_loses_no_water(tmp_path: Path) -> None:
     assert "after 4e+04 s" in seepage(results).get_suptitle()
 
 
-def test_levels_change_with_time_as_they_are_told() -> None:
-    """Ground so permeable that it follows the level at once: constant before and after what is told."""
+def test_levels_follow_the_given_times() -> None:
+    """Ground so permeable that it follows the level at once: constant before and after the given times."""
     still = dam(
         regions=[soil((0.0, 4.0), (0.0, 4.0), hydraulic_conductivity=1.0)],
         water_table=WaterTable(elevation=6.0),
@@ -398,10 +398,10 @@ def test_a_seepage_run_has_one_picture(dammed: Run, tmp_path: Path) -> None:
 def test_the_picture_tells_heads_water_and_discharges(dammed: Run, finished: Run) -> None:
     figure = seepage(dammed)
     axes = figure.axes[0]
-    told = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert told[:2] == ["total head, m", "phreatic line, p = 0"]
-    assert told[2].startswith("reservoir, level 24 m: +0.0017")
-    assert told[3].startswith("reservoir, level 4 m: -0.0017")
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels[:2] == ["total head, m", "phreatic line, p = 0"]
+    assert labels[2].startswith("reservoir, level 24 m: +0.0017")
+    assert labels[3].startswith("reservoir, level 4 m: -0.0017")
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x, m", "y, m")
     assert "steady state" in figure.get_suptitle()
     # The phreatic line leaves the dam where it is known to: at 12.8 m (Hornung and Krueger 1985).
@@ -428,10 +428,10 @@ def rows(scene: Scene) -> dict[str, tuple[bool, str]]:
 
 
 def test_the_physics_of_water_is_told() -> None:
-    told = rows(dam())
-    assert told["seepage"] == (True, "to its steady state")
-    assert told["partial saturation"] == (True, "soil")
-    assert told["water diffusion"] == (False, "no shaking stage")
+    facts = rows(dam())
+    assert facts["seepage"] == (True, "to its steady state")
+    assert facts["partial saturation"] == (True, "soil")
+    assert facts["water diffusion"] == (False, "no shaking stage")
     assert rows(drawdown())["seepage"] == (True, "for its duration")
     assert rows(bank("dry", [Gravity()]))["partial saturation"][0]
     plain = rows(scenes.column())
@@ -458,11 +458,11 @@ def test_plan_tells_what_seepage_costs() -> None:
     (stage,) = changing.stages
     assert (stage.duration, stage.dt_limit) == (4.0e4, "change of saturation")
     assert stage.dt > 0.0
-    # No more frames than steps, whatever the interval: 80 nodes of three fields and places.
+    # No more frames than steps, at any interval: 80 nodes of three fields and places.
     assert changing.file_size < 6 * 8 * 80 * (stage.duration / stage.dt + 2)
 
 
-def test_columns_do_not_go_with_seepage(tmp_path: Path) -> None:
+def test_columns_are_refused_with_seepage(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="cannot be used with a seepage stage"):
         Simulation(dam(sides=FreeField()), keep_columns=True)
     with pytest.raises(InvalidInput, match="cannot be used with a seepage stage"):

@@ -1,4 +1,4 @@
-"""What one can say in Python one can say in TOML, and what follows from what was said."""
+"""A scene is the same in Python and TOML; values that follow from those given."""
 
 from __future__ import annotations
 
@@ -42,15 +42,15 @@ SAND = PM4Sand(Dr=0.55, G0=677.0, hpo=0.40)
 
 
 def column(**changes: Any) -> Scene:
-    """One layer of saturated sand, 1 m wide and 10 m high, with whatever is changed."""
-    said: dict[str, Any] = {
+    """One layer of saturated sand, 1 m wide and 10 m high, with changes."""
+    settings: dict[str, Any] = {
         "spacing": 0.5,
         "water": Water(),
         "water_table": WaterTable(depth=0.0),
         "regions": [Region("sand", box(x=(0, 1), y=(0, 10)), SAND, hydraulic_conductivity=1e-3, Gs=2.67)],
         "stages": [Gravity(), Shaking(duration=1.0)],
     }
-    return Scene(**(said | changes))
+    return Scene(**(settings | changes))
 
 
 def dry_column(**densities: float) -> Scene:
@@ -61,7 +61,7 @@ def dry_column(**densities: float) -> Scene:
 # The example
 
 
-def test_example_says_the_same_in_both_languages() -> None:
+def test_example_is_the_same_in_python_and_toml() -> None:
     from_toml = Scene.from_toml(LEVEL_GROUND / "scene.toml")
     from_python = runpy.run_path(str(LEVEL_GROUND / "scene.py"))["scene"]
     assert from_toml == from_python
@@ -69,12 +69,12 @@ def test_example_says_the_same_in_both_languages() -> None:
 
 def test_example_is_the_site_of_the_paper() -> None:
     scene = Scene.from_toml(LEVEL_GROUND / "scene.toml")
-    told = [
+    parts = [
         (r.shape.geometry.bounds, r.material.Dr, r.material.G0, r.material.hpo)
         for r in scene.regions
         if isinstance(r.material, PM4Sand)
     ]
-    assert told == [
+    assert parts == [
         ((0.0, 12.0, 1.0, 20.0), 0.35, 476.0, 0.53),
         ((0.0, 6.0, 1.0, 12.0), 0.55, 677.0, 0.40),
         ((0.0, 0.0, 1.0, 6.0), 0.75, 890.0, 0.63),
@@ -184,11 +184,11 @@ def test_motion_comes_back_bit_for_bit(motion: Motion) -> None:
     assert stage.motion.load() == motion
 
 
-def test_toml_holds_what_was_said_and_every_default_on_request() -> None:
+def test_toml_holds_given_values_and_every_default_on_request() -> None:
     scene = column(numerics=Numerics(velocity_filter=0.2))
-    said = scene.to_toml()
-    assert "velocity_filter = 0.2" in said
-    assert "smoothing_ratio" not in said
+    text = scene.to_toml()
+    assert "velocity_filter = 0.2" in text
+    assert "smoothing_ratio" not in text
     assert "smoothing_ratio = 1.4" in scene.to_toml(resolved=True)
 
 
@@ -206,7 +206,7 @@ def test_scenes_cannot_be_changed() -> None:
     assert isinstance(scene.regions, tuple)
 
 
-def test_arrays_stand_where_lists_may() -> None:
+def test_arrays_are_accepted_for_lists() -> None:
     output = Output(depths=np.array([1.0, 2.0]), points=np.array([[0.5, 3.0]]))
     assert output == Output(depths=[1, 2], points=[(0.5, 3.0)])
     assert column(spacing=np.float32(0.5)).spacing == 0.5
@@ -344,7 +344,7 @@ def test_elastic_pairs_are_equivalent() -> None:
     assert Elastic(G=1.0e4, K=2.0e4).core() == _core.Soil.elastic(G=1.0e4, K=2.0e4)
 
 
-def test_sand_hands_its_parameters_on() -> None:
+def test_sand_gives_its_parameters_to_the_core() -> None:
     sand = PM4Sand(relative_density=0.5, shear_modulus_coefficient=600, contraction_rate=0.4, z_max=2)
     assert sand.core() == _core.Soil.pm4sand(Dr=0.5, G0=600.0, hpo=0.4, z_max=2.0, nu=None)
     assert sand.core() != _core.Soil.pm4sand(Dr=0.5, G0=600.0, hpo=0.4)

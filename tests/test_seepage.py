@@ -1,4 +1,4 @@
-"""Water that flows through ground at rest: what can be said, what comes out, and what is refused."""
+"""Seepage through ground at rest: scenes, results and refusals."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from sandboil import InvalidInput
 SAND = sb.Elastic(E=2.0e4, nu=0.3)
 RETENTION = sb.VanGenuchten(8.0, 3.0, residual_saturation=0.05)
 PERMEABILITY = 1.0e-4
-# Steady flow between two faces: k (h1^2 - h2^2)/(2 L), whatever the phreatic surface (Charny).
+# Steady flow between two faces: k (h1^2 - h2^2)/(2 L), for any phreatic surface (Charny).
 DISCHARGE = PERMEABILITY * (8.0**2 - 2.0**2) / (2.0 * 10.0)
 
 
 def block(**changes: Any) -> sb.Region:
     """10 m by 10 m of sand."""
-    said: dict[str, Any] = {
+    settings: dict[str, Any] = {
         "hydraulic_conductivity": PERMEABILITY,
         "retention": RETENTION,
         "Gs": 2.65,
         "porosity": 0.4,
     }
-    return sb.Region("block", sb.box(x=(0, 10), y=(0, 10)), SAND, **(said | changes))
+    return sb.Region("block", sb.box(x=(0, 10), y=(0, 10)), SAND, **(settings | changes))
 
 
 def dam(conditions: list[Any] | None = None, duration: float | None = None, **changes: Any) -> sb.Scene:
     """The block between 8 m of water on its left and 2 m on its right."""
     if conditions is None:
         conditions = [sb.Reservoir("left", level=8.0), sb.Reservoir("right", level=2.0)]
-    said: dict[str, Any] = {
+    settings: dict[str, Any] = {
         "spacing": 0.5,
         "water": sb.Water(),
         "water_table": sb.WaterTable(elevation=8.0),
@@ -41,7 +41,7 @@ def dam(conditions: list[Any] | None = None, duration: float | None = None, **ch
         "sides": sb.Roller(),
         "stages": [sb.Seepage(conditions, duration=duration)],
     }
-    return sb.Scene(**(said | changes))
+    return sb.Scene(**(settings | changes))
 
 
 def test_steady_flow_through_a_dam(tmp_path: Path) -> None:
@@ -112,14 +112,14 @@ def test_soils_and_tables_survive_a_file() -> None:
 def ground(**changes: Any) -> sb.Scene:
     """4 m of level ground with water 2 m below it, at rest and then left alone for a while."""
     region = sb.Region("sand", sb.box(x=(0, 1), y=(0, 4)), SAND, Gs=2.65, porosity=0.4, retention=RETENTION)
-    said: dict[str, Any] = {
+    settings: dict[str, Any] = {
         "spacing": 0.25,
         "water": sb.Water(),
         "water_table": sb.WaterTable(depth=2.0),
         "regions": [region],
         "stages": [sb.Gravity(tolerance=1e-6), sb.Shaking(duration=0.2)],
     }
-    return sb.Scene(**(said | changes))
+    return sb.Scene(**(settings | changes))
 
 
 @pytest.mark.parametrize("above", ["dry", "retention"])
@@ -145,12 +145,12 @@ def test_ground_above_the_water_table(above: str, tmp_path: Path) -> None:
     found = run.field("sigma_v_eff", 0.0, stage="shaking")[order]
     # The end rows alternate by a few per cent of a row's weight times the depth of the column.
     np.testing.assert_allclose(found[2:-2], effective[2:-2], rtol=0.02, atol=0.3)
-    # Nothing moves when the ground is let go, and nothing presses above the water.
+    # Nothing moves when the stage begins, and there is no excess pressure above the water.
     assert np.abs(run.field("displacement")).max() < 1e-4
     assert np.abs(run.field("excess_pore_pressure")).max() < 1e-6
 
 
-def test_seepage_is_the_water_of_what_follows(tmp_path: Path) -> None:
+def test_the_water_of_seepage_continues_in_the_next_stages(tmp_path: Path) -> None:
     stages = [*dam().stages, sb.Gravity(), sb.Shaking(duration=0.05)]
     regions = [block(K0=0.5)]
     run = sb.run(dam(stages=stages, regions=regions), tmp_path / "out")
@@ -193,7 +193,7 @@ def test_coarse_sand_finds_its_steady_state() -> None:
     assert abs(sum(flows)) < 1e-6 * max(flows)
 
 
-def test_full_ground_pays_nothing_for_it() -> None:
+def test_saturated_ground_has_no_cost_of_partial_saturation() -> None:
     scene = ground(water_table=sb.WaterTable(depth=0.0))
     simulation = sb.Simulation(scene)
     simulation.run_stage()
@@ -320,7 +320,7 @@ def test_slip_is_refused(slip: str) -> None:
     assert allowed in refused.value.allowed
 
 
-def test_columns_do_not_go_with_seepage() -> None:
+def test_columns_are_refused_with_seepage() -> None:
     stages = [*dam().stages, sb.Gravity(), sb.Shaking(duration=0.1)]
     with pytest.raises(InvalidInput, match="seepage"):
         sb.Simulation(dam(stages=stages, sides=sb.FreeField()), keep_columns=True)

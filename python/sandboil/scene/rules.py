@@ -9,7 +9,7 @@ from .._model import Model
 
 
 class Message(NamedTuple):
-    """What is said of a rule that is broken.
+    """The message for a rule that is broken.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ MESSAGES: dict[str, Message] = {
     "large displacements with hydraulic conditions": Message(
         STAGE,
         "kind",
-        "must have no hydraulic conditions: their edges would move away",
+        "must have no hydraulic conditions: the edges on which these act would move",
         "still_water is the water around a run-out",
     ),
     "open sides with periodic sides": Message(
