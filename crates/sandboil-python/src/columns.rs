@@ -1,16 +1,11 @@
-//! Free-field columns: their records, and what identifies them.
+//! Records of free-field columns.
 
-use crate::{
-    arrays::{Rows, shaped},
-    errors::CoreError,
-    section::Section,
-    stages::{Gravity, Shaking},
-};
+use crate::arrays::{Rows, shaped};
 use numpy::{PyArray2, PyReadonlyArray2, ToPyArray, ndarray::arr2};
-use pyo3::{exceptions::PyValueError, prelude::*, types::PyBytes};
+use pyo3::{exceptions::PyValueError, prelude::*};
 use sandboil_solver as solver;
 
-/// What a column did in a stage.
+/// The record of a column in a stage.
 #[pyclass(module = "sandboil._core", frozen, eq, from_py_object)]
 #[derive(Clone, PartialEq)]
 pub struct ColumnRecord(pub solver::ColumnRecord);
@@ -59,17 +54,4 @@ impl ColumnRecord {
         let width = solver::ColumnRecord::width(self.0.rows(), self.0.wet);
         Ok(shaped(self.0.values.clone(), (self.0.values.len() / width, width))?.to_pyarray(py))
     }
-}
-
-/// What identifies the columns of the left and the right side in a stage; `None` where there is none.
-#[pyfunction]
-pub fn column_identities<'py>(
-    py: Python<'py>,
-    section: &Section,
-    gravity: Option<PyRef<'_, Gravity>>,
-    stage: &Shaking,
-) -> PyResult<[Option<Bound<'py, PyBytes>>; 2]> {
-    let found = solver::column_identities(&section.0, gravity.map(|stage| stage.0), stage.0.clone())
-        .map_err(CoreError)?;
-    Ok(found.map(|bytes| bytes.map(|bytes| PyBytes::new(py, &bytes))))
 }

@@ -5,6 +5,7 @@ mod choices;
 mod columns;
 mod conditions;
 mod errors;
+mod identity;
 mod laboratory;
 mod section;
 mod seepage;
@@ -23,9 +24,11 @@ mod _core {
     #[pymodule_export]
     use crate::choices::{Choices, broken_rules};
     #[pymodule_export]
-    use crate::columns::{ColumnRecord, column_identities};
+    use crate::columns::ColumnRecord;
     #[pymodule_export]
     use crate::conditions::{Condition, MovingCondition};
+    #[pymodule_export]
+    use crate::identity::column_identities;
     #[pymodule_export]
     use crate::laboratory::{Specimen, carries, pm4sand_constants, small_strain_moduli};
     #[pymodule_export]
