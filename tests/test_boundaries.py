@@ -433,12 +433,12 @@ LATE = [BaseSegment((0, 20)), BaseSegment((20, 40), delay=1.5)]
         (
             lambda: slope(stages=shaken(PULSE, base=CompliantBase(segments=LATE[::-1]), duration=1.0)),
             "scene.stages[1].base.segments[0].delay",
-            "takes 1.5 of 1 s",
+            "arrives at 1.5 s",
         ),
         (
             lambda: slope(stages=shaken(PULSE, base=CompliantBase(apparent_velocity=-20.0), duration=1.0)),
             "scene.stages[1].base.apparent_velocity",
-            "takes 2 of 1 s",
+            "arrives at 2 s",
         ),
         (
             lambda: slope(

@@ -436,7 +436,10 @@ def test_the_physics_of_water_is_told() -> None:
     assert rows(bank("dry", [Gravity()]))["partial saturation"][0]
     plain = rows(scenes.column())
     assert plain["seepage"] == (False, "no seepage stage")
-    assert plain["partial saturation"] == (False, "the water table is nowhere below the ground")
+    assert plain["partial saturation"] == (
+        False,
+        "the water table is at or above the ground surface everywhere",
+    )
     assert rows(scenes.dry_column())["seepage"] == (False, "the scene has no water")
     # Full pores with a curve stay full unless a condition may draw water out of them.
     curved = scenes.column(sides=Roller()).changed(
@@ -444,7 +447,10 @@ def test_the_physics_of_water_is_told() -> None:
     )
     assert rows(curved)["partial saturation"] == (True, "loose")
     closed = curved.changed(**{"stages[1].conditions": []})
-    assert rows(closed)["partial saturation"] == (False, "the water table is nowhere below the ground")
+    assert rows(closed)["partial saturation"] == (
+        False,
+        "the water table is at or above the ground surface everywhere",
+    )
 
 
 def test_plan_tells_what_seepage_costs() -> None:

@@ -1,4 +1,4 @@
-"""Why an answer may not be what was meant."""
+"""Warnings about inputs that are allowed but may not be intended."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ def _of_water(scene: Scene) -> list[Reasons]:
             "partial saturation",
             ", ".join(region.name for region in scene.regions if region.retention) or "dry above the water",
             dry,
-            (_is_always_full(scene), "the water table is nowhere below the ground"),
+            (_is_always_full(scene), "the water table is at or above the ground surface everywhere"),
         ),
     ]
 

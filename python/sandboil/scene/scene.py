@@ -114,12 +114,12 @@ class Scene(Model):
 
     @property
     def statics(self) -> Gravity:
-        """The gravity stage; in a scene without one, that with the defaults."""
+        """The gravity stage; the default one in a scene without it."""
         return next((stage for stage in self.stages if isinstance(stage, Gravity)), Gravity())
 
     @property
     def shakings(self) -> list[tuple[int, Shaking]]:
-        """The shaking stages with their places."""
+        """The shaking stages, each with its index among all stages."""
         return [(i, stage) for i, stage in enumerate(self.stages) if isinstance(stage, Shaking)]
 
     @property

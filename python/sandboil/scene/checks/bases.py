@@ -71,7 +71,7 @@ def _refuse_arrivals(scene: Scene, stage: Shaking, path: str) -> None:
             raise InvalidInput(
                 f"{path}.segments[{places.index(arrival.x)}].delay" if places else f"{path}.{name}",
                 arrival.delay if places else given,
-                f"must let the wave arrive before the stage ends: it takes {arrival.latest:g} of "
-                f"{duration:g} s",
+                f"must let the wave arrive before the stage ends: it arrives at {arrival.latest:g} s, "
+                f"the stage ends at {duration:g} s",
                 "a longer duration",
             )

@@ -78,7 +78,7 @@ def _check_points(scene: Scene, points: Sequence[tuple[float, float]], line: Bas
         return
     away = shapely.distance(shapely.points(np.array(points)), edge)
     farthest = int(np.argmax(away))
-    hint = "for a line inside the section: Drain"
+    hint = "use Drain for a line inside the section"
     if away[farthest] > scene.spacing:
         raise InvalidInput(
             f"{path}[{farthest}]",
@@ -92,7 +92,7 @@ def _check_points(scene: Scene, points: Sequence[tuple[float, float]], line: Bas
         raise InvalidInput(
             path,
             points,
-            f"must follow the edge of the section, it leaves it by {away.max():.3g} m",
+            f"must follow the edge of the section; it is up to {away.max():.3g} m away from it",
             hint,
         )
 
@@ -121,8 +121,7 @@ def refuse_shared_edges(placed: Sequence[Placed], path: str) -> None:
             raise InvalidInput(
                 f"{path}[{m}].on",
                 on,
-                f"must leave out the edge of conditions[{k}], but they share x {x0:g} to {x1:g}, "
-                f"y {y0:g} to {y1:g}",
+                f"must not overlap conditions[{k}]; they share x {x0:g} to {x1:g}, y {y0:g} to {y1:g}",
                 "cut it by x = (left, right) or by points",
             )
 

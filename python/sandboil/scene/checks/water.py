@@ -81,7 +81,7 @@ def _refuse_seepage(scene: Scene, stage: Seepage, place: int) -> None:
         raise InvalidInput(
             "scene.regions",
             [region.name for region in scene.regions],
-            "must hold one that water flows through",
+            "must contain a permeable region",
             _PERMEABLE,
         )
     is_steady = stage.duration is None
@@ -113,7 +113,7 @@ def _refuse_moving(scene: Scene, conditions: Sequence[AnyCondition], path: str) 
     if scene.water is None:
         raise InvalidInput(path, kinds, "need water; this scene has none", _WATER)
     if not _is_permeable(scene):
-        raise InvalidInput(path, kinds, "need soil that water flows through", _PERMEABLE)
+        raise InvalidInput(path, kinds, "need a permeable region", _PERMEABLE)
     at_rest, places = AtRest.of(scene), placed(scene, conditions)
     for k, (condition, line) in enumerate(places):
         own = f"{path}[{k}]"
