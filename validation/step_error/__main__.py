@@ -26,7 +26,7 @@ PANELS = (
     ("cycles_to_3_percent", "cycles to 3 % shear strain"),
 )
 CURVES = {
-    ("modified Euler", "1e-5"): ("modified Euler, 1e-5 (default)", "C0", "o-"),
+    ("modified Euler", "3e-5"): ("modified Euler, 3e-5 (default)", "C0", "o-"),
     ("modified Euler", "1e-4"): ("modified Euler, 1e-4", "C2", "^-"),
     ("modified Euler", "1e-3"): ("modified Euler, 1e-3", "C1", "s-"),
     ("modified Euler", "inf"): ("modified Euler, no error control", "C3", "x--"),
