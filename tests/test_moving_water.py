@@ -119,7 +119,7 @@ def test_a_drain_lowers_what_shaking_raises() -> None:
             {},
             [sb.Head("base", head=8.0), sb.SeepageFace("base", x=(2, 4))],
             "conditions[1].on",
-            "leave out the edge of conditions[0]",
+            "must not overlap conditions[0]",
         ),
         (
             {"water_table": sb.WaterTable(elevation=3.0, above="dry")},

@@ -247,7 +247,7 @@ REFUSED: dict[str, tuple[Callable[[], object], str, str]] = {
     "no soil that lets water through": (
         lambda: dam(**without("hydraulic_conductivity")),
         "scene.regions",
-        "must hold one that water flows through",
+        "must contain a permeable region",
     ),
     "fluxes alone on the way to a steady state": (
         lambda: dam([sb.Flux("left", inflow=1e-6), sb.Flux("right", inflow=-1e-6)]),
