@@ -285,7 +285,7 @@ impl Cells {
             let Crossing { foot, normal } = crossing?;
             let belongs = |sample: usize| {
                 let Sample { direction, half, .. } = self.samples[sample];
-                // The end of a line is no part of the edge that meets it in a corner, nor of the edge that goes on.
+                // The end of a line does not belong to the edge that meets it in a corner, nor to the rest of its own edge.
                 direction.dot(&normal).abs() < LARGEST_COSINE
                     && (foot - places[sample]).dot(&direction).abs() < half + PAST_THE_END * spacing
             };

@@ -75,7 +75,7 @@ pub struct Along {
     derivative: Paired<f64>,
 }
 
-/// Entries of a matrix under way, row by row.
+/// Entries of a matrix that is being built, row by row.
 pub type Rows = Vec<Vec<(u32, f64)>>;
 impl Conduction {
     /// Tables of a geometry: stencils of the nodes at `points`, gradients at their stress nodes. With `has_profile` the

@@ -59,7 +59,7 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// What the exchange brings whatever the heads of the nodes are, m2/s.
+    /// Inflow by the exchange that does not depend on the heads of the nodes, m2/s.
     pub fn constant(&self) -> f64 {
         self.open.map_or(0.0, |open| self.across.strength * (2.0 * open.head))
     }

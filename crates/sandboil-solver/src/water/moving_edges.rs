@@ -206,7 +206,7 @@ impl WaterEdges {
         &self.holds
     }
 
-    /// Whether a condition lets no water through the ground surface above a node but what it prescribes.
+    /// Whether only the inflow of a condition crosses the ground surface above a node.
     pub fn seals(&self, node: u32) -> bool {
         let cell = self.above.binary_search_by_key(&node, |entry| entry.0);
         cell.is_ok_and(|found| !self.holds[self.above[found].1 as usize])

@@ -8,9 +8,9 @@ use crate::{
 };
 use sandboil_soil::{Moisture, VanGenuchten};
 
-/// Change of a relative conductivity from which on the tables of conduction are made anew.
+/// Change of a relative conductivity above which the tables of conduction are renewed.
 const STALE_CONDUCTIVITY: f64 = 0.02;
-/// Factor by which a node may stiffen over the stiffness in the implicit matrix before that is factored anew: a mode whose
+/// Factor by which a node may stiffen over the stiffness in the implicit matrix before it is factored again: a mode whose
 /// true rate is less than twice that of the matrix decays.
 const STALE_STIFFNESS: f64 = 1.5;
 /// Pores of a section that has a retention curve somewhere.

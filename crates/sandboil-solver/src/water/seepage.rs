@@ -26,7 +26,7 @@ use sandboil_sph::Vec2;
 
 /// Change of head in an iteration at which a step is solved, in spacings: Newton's next would be its square.
 pub const HEAD_TOLERANCE: f64 = 1e-6;
-/// Iterations, inner or outer, after which a step is tried anew, shorter.
+/// Iterations, inner or outer, after which a step is repeated with a shorter length.
 pub const MOST_ITERATIONS: u32 = 50;
 /// Iterations along the retention curve itself after which a step is solved by the nested ones.
 pub const DIRECT_ITERATIONS: u32 = 12;
@@ -56,7 +56,7 @@ pub const TRUSTED: f64 = 1.1;
 /// Time over that in which the most permeable soil moves water by a spacing, in which even soil that lets nothing
 /// through keeps its pressure: it makes the equations of such soil solvable.
 pub const AGES: f64 = 1e9;
-/// Iterations of the conjugate gradients after which the preconditioner is made anew.
+/// Iterations of the conjugate gradients after which the preconditioner is renewed.
 pub const STALE_AFTER: usize = 25;
 /// Iterations after which a system has no solution: with fresh factors they go with the root of the anisotropy.
 pub const MOST_GRADIENTS: usize = 500;
@@ -375,7 +375,7 @@ impl Seepage {
         discharge
     }
 
-    /// Middles of the places where a boundary lets water through, and the flow through each, m3/s per m.
+    /// Middles of the cells of a boundary through which water flows, and the flow through each, m3/s per m.
     pub fn outlets(&self, boundary: usize) -> Vec<(Vec2, f64)> {
         let cells = self.law.cells.all.iter().zip(&self.flow);
         cells.filter(|(cell, _)| cell.boundary == boundary).map(|(cell, flow)| (cell.middle, *flow)).collect()
@@ -539,7 +539,7 @@ impl Seepage {
         self.counters.retention_calls += 2;
         let steepest = curve.steepest();
         let peak = curve.at(steepest);
-        // The inner curve goes on along its steepest tangent, where the true one bends back.
+        // The inner curve continues along its steepest tangent, where the true one becomes flatter.
         let inner = |head: f64| {
             let pressure_head = head - self.position[i].y;
             let moisture = curve.at(pressure_head.min(steepest));

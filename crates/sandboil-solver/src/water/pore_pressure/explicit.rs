@@ -61,7 +61,7 @@ impl Flow {
         driven * self.unit_weight * relative
     }
 
-    /// Backward Euler on drains: in a step they can take more than a forward step bears.
+    /// Backward Euler on drains: in a step they can take more than a forward step allows.
     fn draw_to_drains(&mut self, dt: f64) {
         let Some(edges) = &self.edges else { return };
         for drain in edges.drains() {

@@ -41,7 +41,7 @@ fn conduction_of(section: &SectionView) -> Conduction {
     conduction(model, geometry, position, phases.volume(), (outline, walls), has_profile)
 }
 
-/// Whether some soil of a model lets water pass.
+/// Whether some soil of a model is permeable.
 fn drains(model: &Model) -> bool {
     model.regions.iter().any(|region| region.hydraulic_conductivity.major > 0.0)
 }
@@ -85,7 +85,7 @@ enum Scheme {
     Explicit { acceleration_term: bool },
     /// Backward Euler; factors belong to a time step.
     Implicit {
-        // Not stored: they are made anew, the same, from what is.
+        // Not stored: they are computed again, with the same bits.
         #[serde(skip)]
         factors: Option<Factors>,
     },

@@ -8,7 +8,7 @@ use crate::section::{
 use sandboil_sph::Vec2;
 
 /// A node whose pressure follows from that prescribed on the free surface and that of a node below (half-cell rule): only
-/// where the soil lets water out.
+/// where the soil is permeable.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SurfaceNode {
     /// The node.
