@@ -69,7 +69,7 @@ pub enum HydraulicCondition {
     Pressure(Series),
     /// Inflow per area of the edge, m/s; negative flows out.
     Flux(Series),
-    /// Rain per horizontal area, m/s: what the soil does not take runs off.
+    /// Rain per horizontal area, m/s: water that does not infiltrate runs off.
     Rain(Series),
     /// Level of open water, m: its head below the level, a seepage face above.
     Reservoir(Series),
@@ -101,7 +101,7 @@ impl HydraulicCondition {
         self.series().map_or(0.0, |(_, series)| series.at(time))
     }
 
-    /// Whether what is prescribed does not change with time.
+    /// Whether the prescribed value is constant in time.
     pub fn is_constant(&self) -> bool {
         self.series().is_none_or(|(_, series)| series.value.len() == 1)
     }

@@ -273,8 +273,8 @@ impl Conduction {
         collected(rows)
     }
 
-    /// The whole exchange of soil with the relative conductivities of its nodes, m/s; none: saturated. `across` tells what
-    /// is seen beyond the edges, by the index of [`Conduction::beyond`].
+    /// The whole exchange of soil with the relative conductivities of its nodes, m/s; none: saturated. `across` gives the
+    /// exchange beyond the edges, by the index of [`Conduction::beyond`].
     pub fn exchange(&self, relative: Option<&[f64]>, across: impl Fn(usize) -> Across) -> Csr<f64> {
         let mut rows = self.pair_rows(|i, j| relative.map_or(1.0, |relative| between(relative, i, j)));
         self.add_along(|s| relative.map_or(1.0, |relative| relative[s / STRESS_NODES]), &mut rows);

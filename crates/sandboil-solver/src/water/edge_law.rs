@@ -154,7 +154,7 @@ impl EdgeLaw {
         wetted.max(soil)
     }
 
-    /// Lets cells that `may_switch` hold their head or take their inflow, by the heads of the nodes. Returns whether a cell
+    /// Switches cells that `may_switch` between their head and their inflow by the heads of the nodes. Returns whether a cell
     /// changed its state.
     pub fn switch(
         &mut self,

@@ -284,7 +284,7 @@ impl WaterEdges {
         }
     }
 
-    /// Lets cells hold their head or take their inflow, by the present state of the nodes. Returns whether one changed.
+    /// Switches cells between their head and their inflow by the present state of the nodes. Returns whether one changed.
     pub fn switch(&mut self, conduction: &Conduction, nodes: Nodes) -> bool {
         let switched = self.law.switch(conduction.beyond(), &self.now, nodes, &mut self.holds, |_| true);
         if switched {

@@ -100,7 +100,7 @@ impl Wetting {
     }
 
     /// Pressure rise of a node per volume of water pressed into a unit of its volume, kPa: the inverse of Eq. 3's storage
-    /// `n S_r / K_f + (n / gamma_f) dS_r/dh`. Soil that holds air without a retention curve gives way.
+    /// `n S_r / K_f + (n / gamma_f) dS_r/dh`. Zero stiffness in soil that holds air without a retention curve.
     fn stiffness(&self, node: usize, moisture: &Moisture) -> f64 {
         if self.curve[node].is_none() && moisture.saturation < 1.0 {
             return 0.0;

@@ -53,8 +53,8 @@ pub const FOLLOWED: f64 = 0.5;
 pub const CALMED: f64 = 0.5;
 /// Factor on the share of one that does not.
 pub const TRUSTED: f64 = 1.1;
-/// Time over that in which the most permeable soil moves water by a spacing, in which even soil that lets nothing
-/// through keeps its pressure: it makes the equations of such soil solvable.
+/// Time over that in which the most permeable soil moves water by a spacing, in which even impermeable
+/// soil keeps its pressure: it makes the equations of such soil solvable.
 pub const AGES: f64 = 1e9;
 /// Iterations of the conjugate gradients after which the preconditioner is renewed.
 pub const STALE_AFTER: usize = 25;
@@ -215,7 +215,7 @@ impl Seepage {
         self.spacing / fastest
     }
 
-    /// Goes on until the end or until `go_on`, asked after every step with their number, says no. Returns whether the end
+    /// Continues until the end or until `go_on`, asked after every step with their number, says no. Returns whether the end
     /// is reached.
     ///
     /// # Errors
@@ -325,7 +325,7 @@ impl Seepage {
                 self.time += dt;
                 self.counters.steps += 1;
                 let next = dt * (SATURATION_CHANGE / change.max(f64::MIN_POSITIVE)).clamp(CUT, GROWTH);
-                // A step cut short by a corner says nothing against longer ones.
+                // A step shortened by a corner of a series does not limit the next step.
                 self.dt = if dt < self.dt { next.max(self.dt) } else { next };
                 return Ok(());
             }
@@ -612,7 +612,7 @@ impl Seepage {
         self.switch_cells(0.0, &relative, &mut switches);
     }
 
-    /// Lets cells hold their head or take their inflow, each a limited number of times. Returns whether one changed.
+    /// Switches cells between their head and their inflow, each a limited number of times. Returns whether one changed.
     fn switch_cells(&mut self, time: f64, relative: &[f64], switches: &mut [u32]) -> bool {
         let demands = self.demands(time);
         let nodes = Nodes { head: &self.head, relative: Some(relative) };

@@ -1,4 +1,4 @@
-//! Water that stands still around ground that flows: the pressure that grains find wherever they come to.
+//! Still water around ground with large displacements: its pressure at the present places of the nodes.
 
 use crate::{
     error::SolverError,

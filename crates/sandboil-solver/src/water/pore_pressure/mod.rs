@@ -51,7 +51,7 @@ fn drains(model: &Model) -> bool {
 pub struct Flow {
     /// Excess pore pressure at velocity nodes, kPa, compression positive.
     excess: Vec<f64>,
-    /// Pressure beyond that at rest that the grains feel, kPa: at a node tied to the surface what stands on that.
+    /// Pressure beyond that at rest that acts on the grains, kPa: at a node tied to the surface, that on the surface.
     felt: Vec<f64>,
     /// `J F^-T` at velocity nodes: the mean deformation of their stress nodes.
     cofactor: Vec<Cofactor>,
@@ -249,7 +249,7 @@ impl Flow {
         self.follow(section, 0.0);
     }
 
-    /// Counts the excess from the still water where the nodes have come to.
+    /// Computes the excess over the still water at the present places of the nodes.
     pub fn carry(&mut self, position: &[Vec2]) {
         let Some(Still { water, pressure, holds_air, .. }) = &mut self.still else { return };
         for (node, (excess, rest)) in self.excess.iter_mut().zip(pressure).enumerate() {
@@ -289,7 +289,7 @@ impl Flow {
         self.keep(conduction);
     }
 
-    /// Lets conditions hold a head or take an inflow by the present heads. Returns whether one changed.
+    /// Switches conditions between a head and an inflow by the present heads. Returns whether one changed.
     fn switch(&mut self, model: &Model, conduction: &Conduction) -> bool {
         let Some(edges) = &mut self.edges else { return false };
         set_heads(&mut self.next, model, &self.excess, self.unit_weight);
@@ -504,7 +504,7 @@ impl Flow {
         }
     }
 
-    /// What the grains feel of the present pressures.
+    /// Computes the part of the present pressures that acts on the grains.
     fn update_felt(&mut self) {
         for node in 0..self.felt.len() {
             let outside = self.outside(node);
@@ -537,7 +537,7 @@ fn leaks(model: &Model, free_surface: &[Option<Vec2>]) -> Vec<f64> {
     model.region.iter().zip(free_surface).map(open).collect()
 }
 
-/// Pressure rise of a node per unit of volume strain, kPa. Above the water table air gives way.
+/// Pressure rise of a node per unit of volume strain, kPa. Zero above the water table, where pores hold air.
 fn stiffness(model: &Model, phases: &Phases, node: usize) -> f64 {
     if model.saturation(node) < 1.0 { 0.0 } else { model.water_stiffness(phases.porosity(node)) }
 }
