@@ -761,6 +761,10 @@ CATALOGUE: dict[str, dict[str, Slip]] = {
             to("stages", [{"kind": "gravity"}]),
             to("numerics", {"operators": "printed"}),
         ),
+        "dual lattice beside free-field sides": slope(to("numerics", {"operators": "dual"})),
+        "dual lattice with corrected inertia": level(
+            to("numerics", {"operators": "dual", "dispersion_correction": True})
+        ),
         "geometry renewed at no strain": level(to("numerics", {"geometry_strain_limit": 0.0})),
         "gap memory as text": level(to("numerics", {"gap_memory": "yes"})),
     },

@@ -190,6 +190,8 @@ def test_toml_holds_given_values_and_every_default_on_request() -> None:
     assert "velocity_filter = 0.2" in text
     assert "smoothing_ratio" not in text
     assert "smoothing_ratio = 1.4" in scene.to_toml(resolved=True)
+    dual = column(numerics=Numerics(operators="dual")).to_toml(resolved=True)
+    assert "smoothing_ratio = 1.2" in dual
 
 
 def test_file_is_written_and_read(tmp_path: Path) -> None:

@@ -50,7 +50,6 @@ __all__ = [
     "pm4sand_constants",
     "small_strain_moduli",
     "stored_note",
-    "stress_node_offset",
 ]
 
 __revision__: str
@@ -220,7 +219,7 @@ class Numerics:
     def __new__(
         cls,
         *,
-        operators: Literal["conservative", "printed"],
+        operators: Literal["conservative", "dual", "printed"],
         smoothing_ratio: float,
         velocity_filter: float,
         diffusion: Literal["auto", "implicit", "explicit"],
@@ -262,11 +261,11 @@ class Section:
     ) -> Section: ...
     @property
     def period(self) -> float | None: ...
+    def stress_positions(self) -> NDArray[np.float64]:
+        """Places of the stress points at rest (m, 2), m: the order of `vertical_effective_stress`."""
+
     def parts(self) -> dict[str, bytes]:
         """Every part by its name, as bytes: equal parts have equal bytes."""
-
-def stress_node_offset(dx: float, dy: float) -> tuple[float, float]:
-    """Offset (x, y) of a node's first stress node, m; the second lies opposite."""
 
 # Hydraulic conditions
 
@@ -454,8 +453,12 @@ class Choices:
         cls,
         *,
         printed_operators: bool = False,
+        dual_operators: bool = False,
         dispersion_correction: bool = False,
         water: bool = False,
+        retention: bool = False,
+        acceleration_term: bool = False,
+        uneven_base: bool = False,
         periodic_sides: bool = False,
         free_field: bool = False,
         open_sides: bool = False,
@@ -544,6 +547,8 @@ class Simulation:
     def residual(self) -> float:
         """Largest unbalanced acceleration over gravity in a static stage; infinite before its first step."""
     @property
+    def stress_points(self) -> int: ...
+    @property
     def pairs(self) -> int: ...
     @property
     def base_impedance(self) -> list[float]:
@@ -571,9 +576,9 @@ class Simulation:
     def largest_shear_strain(self) -> NDArray[np.float64] | None:
         """Largest engineering shear strain in the stage (n,); None if it is not kept."""
     def stress(self) -> NDArray[np.float64]:
-        """Effective stress of both stress nodes (n, 2, 4): xx, yy, xy, zz, kPa."""
+        """Effective stress at the stress points of each node (n, points, 4): xx, yy, xy, zz, kPa."""
     def strain(self) -> NDArray[np.float64]:
-        """Strain of both stress nodes in the stage (n, 2, 3): xx, yy, xy."""
+        """Strain at the stress points of each node in the stage (n, points, 3): xx, yy, xy."""
     def take_column_records(self) -> tuple[ColumnRecord | None, ColumnRecord | None]:
         """What the left and the right column did in the stage, if it is recorded; once."""
     def take_energy(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

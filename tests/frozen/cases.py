@@ -338,6 +338,8 @@ CASES: dict[str, Case] = {
     "inclined run out, restored": _restored("inclined run out", 300),
     "moving water, restored": _restored("moving water", 150),
     "corrected, restored": _restored("corrected", 200),
+    "dual sand, restored": _restored("dual sand", 200),
+    "dual heap, restored": _restored("dual heap", 300),
     "undrained pond, read": _read("undrained pond"),
     "dry above water, read": _read("dry above water", accuracy="draft"),
     "slope run out, read": _read("slope run out", accuracy="reference"),

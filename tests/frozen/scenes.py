@@ -699,6 +699,50 @@ def repeated_run_out(folder: Path) -> sb.Scene:
     )
 
 
+def dual_sand(folder: Path) -> sb.Scene:
+    """Two sands over rock on the dual lattice, drained implicitly, under a pulse with Rayleigh damping."""
+    porous: dict[str, Any] = {"hydraulic_conductivity": 1e-3, "Gs": 2.67}
+    soils = [(ROCK, 0, 1, porous | {"porosity": 0.4}), (MEDIUM, 1, 2, porous), (LOOSE, 2, 3, porous)]
+    return sb.Scene(
+        spacing=0.25,
+        water=sb.Water(),
+        water_table=sb.WaterTable(depth=0.5, above="dry"),
+        regions=_column(0.5, soils),
+        stages=[
+            sb.Gravity(),
+            sb.Shaking(PULSE, duration=0.4, rayleigh=sb.Rayleigh(ratio=0.02, frequencies=(1.0, 10.0))),
+        ],
+        output=sb.Output(depths=[1.0], stress_paths=True),
+        numerics=sb.Numerics(operators="dual", diffusion="implicit"),
+    )
+
+
+def dual_heap(folder: Path) -> sb.Scene:
+    """A slope of clay on the dual lattice that flows into still water, after a shake without drainage."""
+    return sb.Scene(
+        spacing=0.1,
+        water=sb.Water(bulk_modulus=2.0e4),
+        water_table=sb.WaterTable(elevation=1.0),
+        regions=[
+            sb.Region(
+                "clay",
+                sb.polygon([(0, 0), (1.0, 0), (1.0, 0.4), (0.6, 0.8), (0, 0.8)]),
+                sb.TotalStress(Su=0.4, Sr=0.2, softening_strain=0.2, G=40.0, K=90.0),
+                porosity=0.5,
+                Gs=2.7,
+            )
+        ],
+        sides=sb.Sides(sb.Fixed(), sb.Roller()),
+        stages=[
+            sb.Gravity(),
+            sb.Shaking(WEAK_PULSE, duration=0.1),
+            sb.RunOut(0.6, open_sides=["right"]),
+        ],
+        output=sb.Output(field_dt=0.2),
+        numerics=sb.Numerics(operators="dual"),
+    )
+
+
 ALL: dict[str, Callable[[Path], sb.Scene]] = {
     build.__name__.replace("_", " "): build
     for build in (
@@ -727,5 +771,7 @@ ALL: dict[str, Callable[[Path], sb.Scene]] = {
         corrected_slope,
         inclined_run_out,
         repeated_run_out,
+        dual_sand,
+        dual_heap,
     )
 }

@@ -67,11 +67,12 @@ pub fn rows<'py>(py: Python<'py>, values: &[[f64; 2]]) -> Bound<'py, PyArray2<f6
     arr2(values).to_pyarray(py)
 }
 
-/// Tensors of both stress nodes as an array (n, 2, N).
+/// Tensors at the stress points of each node as an array (n, points, N).
 pub fn pages<'py, const N: usize>(
     py: Python<'py>,
-    values: &[[[f64; N]; 2]],
+    values: &[impl AsRef<[[f64; N]]>],
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    let flat = values.iter().flatten().flatten().copied().collect();
-    Ok(shaped(flat, (values.len(), 2, N))?.to_pyarray(py))
+    let flat = values.iter().flat_map(AsRef::as_ref).flatten().copied().collect();
+    let points = values.first().map_or(0, |of_node| of_node.as_ref().len());
+    Ok(shaped(flat, (values.len(), points, N))?.to_pyarray(py))
 }

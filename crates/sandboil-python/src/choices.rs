@@ -14,8 +14,12 @@ impl Choices {
     #[pyo3(signature = (
         *,
         printed_operators = false,
+        dual_operators = false,
         dispersion_correction = false,
         water = false,
+        retention = false,
+        acceleration_term = false,
+        uneven_base = false,
         periodic_sides = false,
         free_field = false,
         open_sides = false,
@@ -27,8 +31,12 @@ impl Choices {
     #[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "keywords of Python")]
     fn new(
         printed_operators: bool,
+        dual_operators: bool,
         dispersion_correction: bool,
         water: bool,
+        retention: bool,
+        acceleration_term: bool,
+        uneven_base: bool,
         periodic_sides: bool,
         free_field: bool,
         open_sides: bool,
@@ -39,8 +47,12 @@ impl Choices {
     ) -> Self {
         Self(solver::Choices {
             printed_operators,
+            dual_operators,
             dispersion_correction,
             water,
+            retention,
+            acceleration_term,
+            uneven_base,
             periodic_sides,
             free_field,
             open_sides,

@@ -32,9 +32,7 @@ mod _core {
     #[pymodule_export]
     use crate::laboratory::{Specimen, carries, pm4sand_constants, small_strain_moduli};
     #[pymodule_export]
-    use crate::section::{
-        Conductivity, Numerics, Outline, Region, Retention, Section, Side, Water, stress_node_offset,
-    };
+    use crate::section::{Conductivity, Numerics, Outline, Region, Retention, Section, Side, Water};
     #[pymodule_export]
     use crate::seepage::Seepage;
     #[pymodule_export]

@@ -1,11 +1,11 @@
 //! The section at rest: nodes, soils, water, edges and numerics.
 
 use crate::{
-    arrays::{Points, Values, one_of},
+    arrays::{Points, Values, one_of, rows},
     errors::{refused, serialised},
     soil::{Soil, integrator},
 };
-use numpy::PyArray1;
+use numpy::{PyArray1, PyArray2};
 use pyo3::{
     prelude::*,
     types::{IntoPyDict, PyBytes, PyDict},
@@ -151,8 +151,11 @@ impl Outline {
     }
 }
 
-const OPERATORS: [(&str, solver::Operators); 2] =
-    [("conservative", solver::Operators::Conservative), ("printed", solver::Operators::Printed)];
+const OPERATORS: [(&str, solver::Operators); 3] = [
+    ("conservative", solver::Operators::Conservative),
+    ("dual", solver::Operators::Dual),
+    ("printed", solver::Operators::Printed),
+];
 
 const DIFFUSION: [(&str, solver::Diffusion); 3] = [
     ("auto", solver::Diffusion::Auto),
@@ -271,6 +274,11 @@ impl Section {
         })
     }
 
+    /// Places of the stress points at rest (m, 2), m: the order of `vertical_effective_stress`.
+    fn stress_positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        rows(py, &solver::stress_positions(&self.0).iter().map(|at| [at.x, at.y]).collect::<Vec<_>>())
+    }
+
     /// Width between periodic sides, m.
     #[getter]
     fn period(&self) -> Option<f64> {
@@ -314,11 +322,4 @@ impl Section {
         .map(|(name, bytes)| (name, PyBytes::new(py, &bytes)))
         .into_py_dict(py)
     }
-}
-
-/// Offset of a node's first stress node, m; the second lies opposite.
-#[pyfunction]
-pub fn stress_node_offset(dx: f64, dy: f64) -> (f64, f64) {
-    let offset = solver::stress_node_offset(solver::Vec2::new(dx, dy));
-    (offset.x, offset.y)
 }

@@ -117,6 +117,12 @@ impl Simulation {
         self.inner.residual()
     }
 
+    /// Number of stress points.
+    #[getter]
+    fn stress_points(&self) -> usize {
+        self.inner.stress_points()
+    }
+
     #[getter]
     fn pairs(&self) -> usize {
         self.inner.pairs()
@@ -175,12 +181,12 @@ impl Simulation {
         self.inner.largest_shear_strain().map(|values| values.to_pyarray(py))
     }
 
-    /// Effective stress (n, 2, 4): `xx, yy, xy, zz` of both stress nodes, kPa, tension positive.
+    /// Effective stress (n, points, 4): `xx, yy, xy, zz` at the stress points of each node, kPa, tension positive.
     fn stress<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         pages(py, &self.inner.stress())
     }
 
-    /// Strain (n, 2, 3): `xx, yy`, engineering `xy` of both stress nodes.
+    /// Strain (n, points, 3): `xx, yy`, engineering `xy` at the stress points of each node.
     fn strain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         pages(py, &self.inner.strain())
     }

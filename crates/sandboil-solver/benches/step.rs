@@ -10,7 +10,7 @@ mod common;
 #[path = "../../sandboil-soil/benches/yardstick/mod.rs"]
 mod yardstick;
 
-use common::{column, elastic, shaking};
+use common::{column, dual, elastic, shaking};
 use criterion::{BenchmarkId, Criterion, Throughput};
 use sandboil_soil::{
     Soil,
@@ -49,8 +49,8 @@ fn model(ground: Ground, columns: usize) -> Model {
 }
 
 /// A running simulation, shaken by 0.2 m/s at 2 Hz.
-fn under_way(ground: Ground, columns: usize, threads: usize) -> Simulation {
-    let mut simulation = Simulation::new(&model(ground, columns), threads).unwrap();
+fn under_way(model: &Model, threads: usize) -> Simulation {
+    let mut simulation = Simulation::new(model, threads).unwrap();
     simulation.begin(Gravity { tolerance: 1e-4, max_steps: 20_000 }).unwrap();
     simulation.advance(RELAXATION, f64::INFINITY).unwrap();
     let velocity = (0..20_000).map(|k| 0.1 * (4e-3 * std::f64::consts::PI * f64::from(k)).sin()).collect();
@@ -108,7 +108,7 @@ fn compare_with_yardstick() {
     println!("work, nodes, threads, ns per node, yardsticks per node");
     for (name, ground, columns) in CASES {
         for threads in [1, 2] {
-            let mut simulation = under_way(ground, columns, threads);
+            let mut simulation = under_way(&model(ground, columns), threads);
             let steps = (100_000 / simulation.nodes()).max(2) as u64;
             let count = steps as f64 * simulation.nodes() as f64;
             let (seconds, ratio) =
@@ -125,11 +125,18 @@ fn main() {
     let mut criterion = Criterion::default().sample_size(10).configure_from_args();
     let mut group = criterion.benchmark_group("step");
     for (name, ground, columns) in CASES {
-        let mut simulation = under_way(ground, columns, 1);
-        group.throughput(Throughput::Elements(simulation.nodes() as u64));
-        group.bench_function(BenchmarkId::new(name, simulation.nodes()), |bencher| {
-            bencher.iter(|| simulation.advance(1, f64::INFINITY).unwrap());
-        });
+        for (operators, model) in
+            [("conservative", model(ground, columns)), ("dual", dual(model(ground, columns)))]
+        {
+            let mut simulation = under_way(&model, 1);
+            group.throughput(Throughput::Elements(simulation.nodes() as u64));
+            group.bench_function(
+                BenchmarkId::new(format!("{name}, {operators}"), simulation.nodes()),
+                |bencher| {
+                    bencher.iter(|| simulation.advance(1, f64::INFINITY).unwrap());
+                },
+            );
+        }
     }
     group.finish();
     compare_with_yardstick();

@@ -33,6 +33,7 @@ pub use section::{
         stress_node_offset,
     },
     outline::{Outline, Side, Support},
+    stress_layout::stress_positions,
 };
 pub use shear_cell::{CellTest, Departure, ShearCell};
 pub use skeleton::rayleigh::Rayleigh;

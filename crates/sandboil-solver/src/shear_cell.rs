@@ -18,6 +18,7 @@ use crate::{
     section::{
         description::{Conductivity, Model, Numerics, Region, STRESS_NODES, positive},
         outline::{EdgesView, Outline},
+        stress_layout::StressLayout,
     },
     skeleton::{
         local_damping::local_damping,
@@ -333,7 +334,7 @@ impl ShearCell {
         let (model, order, free) = test.model()?;
         let nodes = model.nodes();
         let edges = EdgesView::statics(&model.outline);
-        let geometry = Geometry::build(&model, &model.position, &model.volume, edges, None);
+        let geometry = Geometry::build(&model, &model.position, &model.volume, edges);
         let reached = |j: usize| geometry.gradient.transposed.iter_row(j).map(|(s, _)| s / STRESS_NODES + 1);
         let computed =
             if test.every_stress_node { nodes } else { (0..free).flat_map(reached).max().unwrap_or(free) };
@@ -347,7 +348,12 @@ impl ShearCell {
             ..StressPoint::default()
         };
         let mut points = vec![point; STRESS_NODES * computed];
-        let soil = SoilField::plastic(&first_nodes(&model, computed), &mut points, test.void_ratio)?;
+        let soil = SoilField::plastic(
+            &first_nodes(&model, computed),
+            &StressLayout::Diagonal,
+            &mut points,
+            test.void_ratio,
+        )?;
         let pool = Pool::new(threads)?;
         let spectrum = PressureSpectrum::new(&model);
         let mut cell = Self {
@@ -456,6 +462,8 @@ impl ShearCell {
         }
         let filter = self.test.numerics.velocity_filter / self.test.spacing;
         let step = StrainStep {
+            layout: &StressLayout::Diagonal,
+            shared: None,
             geometry: &self.geometry,
             velocity: &self.velocity,
             filter,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,30 +22,27 @@ from .probes import Probe
 if TYPE_CHECKING:
     from ..scene.scene import Scene
 
+# Distances over the spacing, in x and y, of the points around a stress point at which the stress at rest is
+# taken. They
+# differ, so that none is equally far from two nodes.
+BESIDE = (0.01, 0.02)
+
 # A stage of grains.
 GrainStage = _core.Gravity | _core.Shaking | _core.RunOut
-
-
-def stress_node_positions(particles: Discretisation) -> Floats:
-    """Initial places of the stress nodes, m, (n, 2, 2): node, first or second, (x, y)."""
-    offset = np.array(_core.stress_node_offset(*particles.spacing))
-    places: Floats = particles.position[:, None, :] + offset * np.array([[[1.0], [-1.0]]])
-    return places
 
 
 def section_description(scene: Scene, particles: Discretisation) -> _core.Section:
     """The section at rest: nodes, soils, water, edges and numerics."""
     x0, x1, _, _ = particles.bounds
-    sigma_v_eff, _ = particles.stress_at(stress_node_positions(particles).reshape(-1, 2))
     water = scene.water
-    return _core.Section(
+    describe = partial(
+        _core.Section,
         spacing=particles.spacing,
         position=particles.position,
         volume=particles.volume,
         region=particles.region.astype(np.uint32),
         regions=[_region(scene, region) for region in scene.regions],
         surface_elevation=particles.surface_elevation,
-        vertical_effective_stress=sigma_v_eff,
         pore_pressure=np.empty(0) if water is None else particles.pore_pressure0,
         saturation=np.empty(0) if particles.saturation0 is None else particles.saturation0,
         water=None
@@ -54,6 +53,22 @@ def section_description(scene: Scene, particles: Discretisation) -> _core.Sectio
         outline=outline_description(scene),
         numerics=_numerics(scene),
     )
+    places = describe(vertical_effective_stress=np.empty(0)).stress_positions()
+    # Elsewhere stress points lie inside the cell of their node.
+    is_at_corners = scene.numerics.operators == "dual"
+    sigma_v_eff = _stress_around(particles, places) if is_at_corners else particles.stress_at(places)[0]
+    return describe(vertical_effective_stress=sigma_v_eff)
+
+
+def _stress_around(particles: Discretisation, places: Floats) -> Floats:
+    """Vertical effective stress at rest at stress points, kPa: the mean of four points beside each.
+
+    A point at a corner of cells may lie on a contact of soils or on the edge of a column of nodes.
+    """
+    aside = np.multiply(BESIDE, particles.spacing)
+    around = [particles.stress_at(places + aside * quarter)[0] for quarter in product((-1.0, 1.0), repeat=2)]
+    mean: Floats = np.mean(around, axis=0)
+    return mean
 
 
 def outline_description(scene: Scene) -> _core.Outline:

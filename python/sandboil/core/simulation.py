@@ -473,7 +473,7 @@ class Simulation:
     @property
     def stress_nodes(self) -> int:
         """Number of stress nodes."""
-        return 0 if self._grains is None else int(np.prod(self._grains.stress().shape[:2]))
+        return 0 if self._grains is None else self._grains.stress_points
 
     @property
     def pairs(self) -> int:

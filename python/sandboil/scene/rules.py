@@ -89,4 +89,17 @@ MESSAGES: dict[str, Message] = {
         "where no surface fixes the pressure",
         "dry ground or Periodic sides may have the printed operators",
     ),
+    "dual lattice with edges that it does not have": Message(
+        NUMERICS,
+        "operators",
+        "must be 'conservative' beside free-field sides, on a base that is not level, and with hydraulic "
+        "conditions while the ground moves",
+        "Periodic, Roller and Fixed sides on a level base may have the dual lattice",
+    ),
+    "dual lattice with physics that it does not have": Message(
+        NUMERICS,
+        "operators",
+        "must be 'conservative' with dispersion_correction, retention curves and acceleration_term = 'on'",
+        "leave these out, or take operators = 'conservative'",
+    ),
 }

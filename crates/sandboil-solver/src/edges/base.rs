@@ -143,7 +143,7 @@ impl Base {
 pub fn base_condition(operators: Operators, absorbs_vertically: bool) -> Condition {
     match (operators, absorbs_vertically) {
         (_, true) => Condition::Traction,
-        (Operators::Conservative, false) => Condition::VerticalRoller,
+        (Operators::Conservative | Operators::Dual, false) => Condition::VerticalRoller,
         // Free slip, with the odd shear stress of the images (Section 4.2).
         (Operators::Printed, false) => Condition::FreeSlip,
     }

@@ -190,7 +190,7 @@ impl Dashpots {
 /// (Section 4.2).
 pub fn trace(model: &Model, position: &[Vec2], points: &[Vec2], nodes: &[usize]) -> Csr<f64> {
     match model.numerics.operators {
-        Operators::Conservative => point_weights(model, position, points),
+        Operators::Conservative | Operators::Dual => point_weights(model, position, points),
         Operators::Printed => {
             let mut table = Csr::with_capacity(nodes.len(), nodes.len());
             for &node in nodes {

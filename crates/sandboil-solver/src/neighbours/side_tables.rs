@@ -84,7 +84,7 @@ impl SideTables {
     /// Tables for the present positions of the section.
     pub fn new(section: &SectionView, hand: Hand) -> Self {
         match section.model.numerics.operators {
-            Operators::Conservative => Self::completed(section, hand),
+            Operators::Conservative | Operators::Dual => Self::completed(section, hand),
             Operators::Printed => Self::on_outermost_row(section, hand),
         }
     }

@@ -19,8 +19,9 @@ use crate::{
         time_step::PressureCoupling,
     },
     section::{
-        description::{AccelerationTerm, Diffusion, Model},
+        description::{AccelerationTerm, Diffusion, Model, Operators},
         outline::{Outline, Walls},
+        stress_layout::StressLayout,
     },
     skeleton::{
         contacts::Contacts, inertia::Dispersion, rayleigh::RayleighDamping, soils::SoilField,
@@ -32,7 +33,9 @@ use crate::{
         stage::{Displacements, End, Stage, Surface, WaterReference},
     },
     water::{
+        corner_pressure::CornerFlow,
         pore_pressure::{Flow, FlowScheme, Pores},
+        pore_water::PoreWater,
         still_water::StillWater,
     },
     weights::balance,
@@ -87,7 +90,10 @@ impl<N: Neighbour> Driver<N> {
         let Ground { placement, water, sharpness, free_surface, .. } = &mut domain.ground;
         (*placement, *water, *sharpness, *free_surface) = (Placement::Drawn, None, None, None);
         domain.set_walls(Walls::statics(&domain.ground.model.outline));
-        domain.ground.soil = SoilField::elastic(&domain.ground.model, &mut domain.ground.points)?;
+        domain.ground.soil = {
+            let Ground { model, layout, points, .. } = &mut domain.ground;
+            SoilField::elastic(model, layout, points)?
+        };
         domain.set_present_forces();
         let response = if domain.ground.geometry.is_balanced { balance::RESPONSE } else { 1.0 };
         let limit = domain.limit(PressureCoupling::None, response * stage.time_step_factor);
@@ -151,7 +157,7 @@ impl<N: Neighbour> Driver<N> {
         }
         let Domain { ground, clock, .. } = &mut self.domain;
         // With large displacements there are no constant forces.
-        let (Active::Moving(stage), 0, Some(flow), None) =
+        let (Active::Moving(stage), 0, Some(water), None) =
             (&mut self.active, clock.step, &mut ground.water, ground.sharpness)
         else {
             return Err(SolverError::Order {
@@ -159,13 +165,16 @@ impl<N: Neighbour> Driver<N> {
                 needs: "water and a shaking stage before its first step",
             });
         };
-        flow.set_excess(|own| {
-            for (slot, &user) in own.iter_mut().zip(&ground.order) {
-                *slot = excess[user];
+        let own: Vec<f64> = ground.order.iter().map(|&user| excess[user]).collect();
+        match (water, &ground.layout) {
+            (PoreWater::Nodes(flow), _) => flow.set_excess(|excess| excess.copy_from_slice(&own)),
+            (PoreWater::Corners(flow), StressLayout::Dual(dual)) => {
+                flow.set_from_nodes(&ground.model, &ground.position, dual, &own);
             }
-        });
+            (PoreWater::Corners(_), StressLayout::Diagonal) => {}
+        }
         if let Some(neighbour) = &mut stage.neighbour {
-            neighbour.set_excess(&ground.edges, flow.own_excess());
+            neighbour.set_excess(&ground.edges, &own);
         }
         self.domain.balance_under_load();
         Ok(())
@@ -264,10 +273,10 @@ impl Domain {
 
     /// Starts the soil models from the present stress, with the ground at rest.
     fn begin_soils(&mut self) -> Result<(), SolverError> {
-        let Ground { model, velocity, acceleration, points, soil, .. } = &mut self.ground;
+        let Ground { model, layout, velocity, acceleration, points, soil, .. } = &mut self.ground;
         velocity.fill(Vec2::zeros());
         acceleration.fill(Vec2::zeros());
-        *soil = SoilField::plastic(model, points, None)?;
+        *soil = SoilField::plastic(model, layout, points, None)?;
         self.counters.inadmissible_starts = soil.inadmissible_starts();
         if let Some(inertia) = &mut self.inertia {
             inertia.contacts = Some(Contacts::new(model, points));
@@ -311,11 +320,16 @@ impl Domain {
         let scheme = self.flow_scheme(stage.time_step_factor);
         let before = self.ground.water.take();
         let outline = self.ground.outline();
+        if self.ground.layout.dual().is_some() {
+            self.ground.water = self.begin_corner_pressure(stage, scheme, before.as_ref(), &outline)?;
+            return Ok(PressureCoupling::of(self.ground.water.as_ref()));
+        }
+        let before = before.as_ref().and_then(PoreWater::nodes);
         let mut flow = Flow::new(self.ground.view(&outline), scheme, &stage.conditions)?;
         if let Some(flow) = &mut flow {
             match &stage.water_reference {
                 WaterReference::StillWater { line } => {
-                    self.stand_in_water(flow, line.as_deref(), before.as_ref(), &outline)?;
+                    self.stand_in_water(flow, line.as_deref(), before, &outline)?;
                 }
                 WaterReference::AtRest => {
                     if let Some(before) = before {
@@ -324,12 +338,34 @@ impl Domain {
                 }
             }
         }
-        self.ground.water = flow;
-        Ok(match (&self.ground.water, scheme) {
-            (None, _) => PressureCoupling::None,
-            (_, FlowScheme::Implicit) => PressureCoupling::Implicit,
-            _ => PressureCoupling::Explicit,
-        })
+        self.ground.water = flow.map(|flow| PoreWater::Nodes(Box::new(flow)));
+        Ok(PressureCoupling::of(self.ground.water.as_ref()))
+    }
+
+    /// The same at the corners of cells.
+    fn begin_corner_pressure(
+        &self,
+        stage: &Stage,
+        scheme: FlowScheme,
+        before: Option<&PoreWater>,
+        outline: &Outline,
+    ) -> Result<Option<PoreWater>, SolverError> {
+        let section = self.ground.view(outline);
+        let model = section.model;
+        let (Some(mut flow), Some(water)) = (CornerFlow::new(section, scheme), model.water) else {
+            return Ok(None);
+        };
+        if let Some(before) = before.and_then(PoreWater::corners) {
+            flow.continue_from(before);
+        }
+        if let WaterReference::StillWater { line } = &stage.water_reference {
+            let still = match line {
+                Some(line) => StillWater::new(water, line)?,
+                None => StillWater::at_rest(model, water),
+            };
+            flow.stand_in(still, &section, &model.neutral_stress());
+        }
+        Ok(Some(PoreWater::Corners(Box::new(flow))))
     }
 
     /// Starts `flow` in still water with its surface at `line`, or with the water surface of the static
@@ -379,7 +415,9 @@ impl Domain {
         let acceleration = match numerics.acceleration_term {
             AccelerationTerm::On => true,
             AccelerationTerm::Off => false,
-            AccelerationTerm::Auto => conductivity <= ACCELERATION_TERM_CONDUCTIVITY,
+            AccelerationTerm::Auto => {
+                numerics.operators != Operators::Dual && conductivity <= ACCELERATION_TERM_CONDUCTIVITY
+            }
         };
         match (implicit, acceleration) {
             (true, _) => FlowScheme::Implicit,

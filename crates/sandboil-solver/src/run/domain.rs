@@ -10,8 +10,9 @@ use crate::{
         time_step::{Limits, PressureCoupling, PressureSpectrum, TimeLimit, region_limit},
     },
     section::{
-        description::{Model, STRESS_NODES},
+        description::Model,
         outline::{EdgesView, Walls},
+        stress_layout::StressLayout,
     },
     skeleton::{
         contacts::Contacts,
@@ -19,17 +20,19 @@ use crate::{
         local_damping::local_damping,
         printed::PrintedStress,
         rayleigh::{Rayleigh, RayleighDamping},
+        shared_volume::SharedStrain,
         soils::{StrainStep, StressRows, StressWork},
         strain_and_force::{NodalShare, motion},
         viscosity::{MovingNodes, Viscosity},
     },
     water::{
         pore_pressure::{SkeletonMotion, TimeStep},
+        pore_water::PoreWater,
         still_water::suction_and_pressure,
     },
     weights::{
         geometry::Geometry,
-        points::{consistent_gradient, point_weights, stress_node_positions, stress_node_values},
+        points::{consistent_gradient, point_weights, stress_node_values},
     },
 };
 use sandboil_soil::Stress;
@@ -67,6 +70,8 @@ pub struct Workspace {
     pub water_force: Vec<Vec2>,
     /// Stresses of the printed operators, if these are chosen.
     pub printed: Option<PrintedStress>,
+    /// Volume strains that corners at free surfaces share.
+    pub shared: Option<SharedStrain>,
     /// Sums over the chunks of nodes.
     sums: Vec<MotionSum>,
 }
@@ -127,6 +132,7 @@ impl Domain {
                 shares: vec![NodalShare::default(); ground.points.len()],
                 water_force: vec![Vec2::zeros(); nodes],
                 printed: ground.geometry.printed.as_ref().map(|_| PrintedStress::default()),
+                shared: ground.layout.dual().map(SharedStrain::new),
                 sums: vec![MotionSum::default(); chunks(nodes)],
             },
             spectrum: PressureSpectrum::new(&ground.model),
@@ -151,7 +157,7 @@ impl Domain {
         coupling: PressureCoupling,
         factor: f64,
     ) -> TimeLimit {
-        let Ground { model, points, sharpness, free_surface, .. } = &self.ground;
+        let Ground { model, points, soil, sharpness, free_surface, .. } = &self.ground;
         let limits = Limits {
             coupling,
             spectrum: &self.spectrum,
@@ -160,16 +166,11 @@ impl Domain {
             viscosity: self.damping.viscosity.as_ref().map_or(0.0, Viscosity::coefficient),
             surface_is_tied: free_surface.is_none(),
         };
-        // Nodes are sorted by region, so that each region is contiguous.
-        let mut first = 0;
-        let TimeLimit { dt, criterion } = model
-            .region
-            .chunk_by(|a, b| a == b)
-            .map(|stretch| {
-                let rows = STRESS_NODES * first..STRESS_NODES * (first + stretch.len());
-                first += stretch.len();
+        let TimeLimit { dt, criterion } = soil
+            .rows()
+            .map(|(region, rows)| {
                 let stiffest = points[rows].iter().fold(0.0_f64, |most, point| most.max(point.stiffness));
-                (stretch[0] as usize, stiffest)
+                (region, stiffest)
             })
             .filter(|(_, stiffness)| *stiffness > 0.0)
             .map(|(region, stiffness)| region_limit(model, region, stiffness, &limits))
@@ -211,6 +212,7 @@ impl Domain {
 
     /// Fills the shares of the stress nodes from the present stress and a velocity field.
     fn refresh_shares(&mut self, velocity: &[Vec2]) {
+        self.carry_neutral_stress();
         let filter = self.ground.filter();
         let Ground { geometry, points, .. } = &self.ground;
         let shares = &mut self.workspace.shares;
@@ -239,7 +241,8 @@ impl Domain {
         let Ground { model, water, position, phases, .. } = &self.ground;
         let volume = phases.volume();
         let mut parts = Vec::new();
-        if let Some(buoyancy) = water.as_ref().and_then(|flow| flow.buoyancy(position, volume)) {
+        let buoyancy = water.as_ref().and_then(|water| water.buoyancy(position, volume));
+        if let Some(buoyancy) = buoyancy {
             parts.push(buoyancy);
         } else if model.water.is_some() {
             let (suction, pressure) = suction_and_pressure(model);
@@ -258,8 +261,8 @@ impl Domain {
     /// the ground surface, so its force is that of its gradient. Suction ends at the surface and pulls it
     /// towards the ground: it acts like a part of the stress, without a traction at the surface.
     fn suction_force(&mut self, suction: &[f64]) -> Vec<Vec2> {
-        let Ground { model, position, points, .. } = &mut self.ground;
-        let places = stress_node_positions(position, model.spacing);
+        let Ground { model, layout, position, points, .. } = &mut self.ground;
+        let places = layout.positions(position, model.spacing);
         let weights = point_weights(model, position, &places);
         let kept: Vec<Stress> = points.iter().map(|point| point.stress).collect();
         for (s, point) in points.iter_mut().enumerate() {
@@ -285,7 +288,7 @@ impl Domain {
         let force = self.static_force();
         let Ground { water, geometry, .. } = &self.ground;
         let held_back = |j: usize| match (water, &geometry.flow, &geometry.printed) {
-            (Some(flow), Some(tables), None) => flow.held_back(tables, j),
+            (Some(PoreWater::Nodes(flow)), Some(tables), None) => flow.held_back(tables, j),
             _ => Vec2::zeros(),
         };
         self.forces.balance_under_load(&force, held_back);
@@ -298,8 +301,8 @@ impl Domain {
         let threaded = self.threaded;
         let Self { ground, forces: constant, damping, inertia, workspace, .. } = self;
         let Ground { model, velocity, acceleration, geometry, points, phases, mass, water, .. } = ground;
-        let Workspace { shares, water_force, printed, sums } = workspace;
-        let (nodes, is_wet) = (model.nodes(), water.is_some());
+        let Workspace { shares, water_force, printed, sums, .. } = workspace;
+        let (nodes, is_wet) = (model.nodes(), matches!(water, Some(PoreWater::Nodes(_))));
         let forces = NodalForces {
             geometry,
             points,
@@ -404,9 +407,9 @@ impl Domain {
     /// Gathers the artificial viscosity of the present motion, if the stage has one.
     pub fn update_viscosity(&mut self) {
         let Some(viscosity) = &mut self.damping.viscosity else { return };
-        let Ground { model, geometry, points, position, velocity, phases, .. } = &self.ground;
+        let Ground { model, layout, geometry, points, position, velocity, phases, .. } = &self.ground;
         let nodes = MovingNodes { position, velocity, volume: phases.volume() };
-        viscosity.update(self.threaded, model, geometry, points, nodes);
+        viscosity.update(self.threaded, (model, layout), geometry, points, nodes);
     }
 
     /// Updates strain, stress and the shares for the next force loop, from the velocity at mid-step.
@@ -415,9 +418,13 @@ impl Domain {
     /// [`SolverError::Diverged`] or [`SolverError::Soil`].
     pub fn update_stress(&mut self, dt: f64, with_after: bool) -> Result<StressWork, SolverError> {
         let filter = self.ground.filter();
-        let Ground { model, soil, geometry, velocity, points, .. } = &mut self.ground;
+        let Ground { model, layout, soil, geometry, velocity, points, .. } = &mut self.ground;
         let integrator = &model.numerics.integrator;
-        let step = StrainStep { geometry, velocity, filter, dt, integrator, with_after };
+        if let (Some(shared), Some(dual)) = (&mut self.workspace.shared, layout.dual()) {
+            shared.gather(dual, geometry, points, velocity, dt);
+        }
+        let shared = self.workspace.shared.as_ref();
+        let step = StrainStep { layout, geometry, shared, velocity, filter, dt, integrator, with_after };
         let report =
             soil.step(self.threaded, &step, StressRows { points, shares: &mut self.workspace.shares });
         let (report, work) = report.map_err(|error| match error.soil_divergence() {
@@ -427,6 +434,9 @@ impl Domain {
         let Ground { geometry, velocity, points, .. } = &self.ground;
         if let Some(rayleigh) = &mut self.damping.rayleigh {
             rayleigh.add_stress(self.threaded, geometry, velocity, points, &mut self.workspace.shares);
+        }
+        if !matches!(self.ground.water, Some(PoreWater::Corners(_))) {
+            self.carry_neutral_stress();
         }
         self.counters.soil.merge(&report);
         self.counters.plastic_updates += self.ground.soil.plastic_points() as u64;
@@ -438,17 +448,34 @@ impl Domain {
     ///
     /// # Errors
     /// [`SolverError::Diverged`] if the matrix of implicit diffusion is not finite.
-    pub fn update_water(&mut self, dt: f64) -> Result<(), SolverError> {
-        let Ground { water, geometry, points, velocity, acceleration, .. } = &mut self.ground;
-        let (Some(flow), Some(tables)) = (water, &geometry.flow) else { return Ok(()) };
+    pub fn update_water(&mut self, dt: f64, with_after: bool) -> Result<StressWork, SolverError> {
+        let Ground { water, geometry, layout, points, velocity, acceleration, .. } = &mut self.ground;
+        let work = match (water, &geometry.flow, layout.dual()) {
+            (Some(PoreWater::Nodes(flow)), Some(tables), _) => {
+                let motion = SkeletonMotion { velocity, acceleration };
+                let time = TimeStep { end: self.clock.time + dt, dt };
+                flow.step(self.threaded, tables, points, motion, time).then(StressWork::default)
+            }
+            (Some(PoreWater::Corners(flow)), _, Some(dual)) => {
+                flow.step(self.threaded, dual, points, dt, with_after)
+            }
+            _ => return Ok(StressWork::default()),
+        };
         self.counters.flow_calls += 1;
-        let motion = SkeletonMotion { velocity, acceleration };
-        let time = TimeStep { end: self.clock.time + dt, dt };
-        if flow.step(self.threaded, tables, points, motion, time) {
-            Ok(())
-        } else {
-            Err(self.diverged("pore pressure matrix", 0, f64::NAN))
-        }
+        let work = work.ok_or_else(|| self.diverged("pore pressure matrix", 0, f64::NAN))?;
+        self.carry_neutral_stress();
+        Ok(work)
+    }
+
+    /// Takes the present pore pressure at corners, and what their groups carry, into their stress and shares.
+    fn carry_neutral_stress(&mut self) {
+        let Ground { layout: StressLayout::Dual(dual), points, water, .. } = &mut self.ground else { return };
+        let flow = water.as_ref().and_then(PoreWater::corners);
+        let shared = self.workspace.shared.as_mut();
+        let Some(shared) = shared else { return };
+        shared.carry(self.threaded, dual, points, &mut self.workspace.shares, |s| {
+            flow.map_or(0.0, |flow| flow.at_place(dual.place[s] as usize))
+        });
     }
 
     /// Moves the nodes by a step, and updates the pressure from which the excess counts.
@@ -457,7 +484,7 @@ impl Domain {
         for (x, v) in position.iter_mut().zip(velocity) {
             *x += *v * dt;
         }
-        if let Some(flow) = water {
+        if let Some(flow) = water.as_mut().and_then(PoreWater::nodes_mut) {
             flow.carry(position);
         }
     }
@@ -466,11 +493,13 @@ impl Domain {
     pub fn rebuild_geometry(&mut self) {
         // All tables are replaced; the lists of the old ones are reused if they are still valid.
         let previous = self.ground.geometry.clone();
+        self.ground.move_corners();
         self.counters.porosity_clips += self.ground.update_volumes();
         let outline = self.ground.outline();
-        let Ground { model, position, phases, walls, .. } = &self.ground;
-        self.ground.geometry = Geometry::build(
+        let Ground { model, layout, position, phases, walls, .. } = &self.ground;
+        self.ground.geometry = Geometry::renew(
             model,
+            layout,
             position,
             phases.volume(),
             EdgesView { outline: &outline, walls: *walls },
@@ -478,7 +507,7 @@ impl Domain {
         );
         self.ground.update_surroundings(self.threaded);
         let time = self.clock.time;
-        self.ground.with_water(&outline, |flow, section| flow.follow(section, time));
+        self.ground.with_water(&outline, |water, section| water.follow(section, time));
         self.counters.geometry_builds += 1;
         self.sharpen_contacts();
     }
@@ -510,7 +539,7 @@ impl Domain {
     pub fn guard(&self) -> Result<(), SolverError> {
         self.check_finite("velocity", |ground, j| ground.velocity[j].norm(), RUNAWAY_SPEED)?;
         match &self.ground.water {
-            Some(flow) => self.check_finite("pore pressure", |_, j| flow.excess(j).abs(), f64::INFINITY),
+            Some(water) => self.check_finite("pore pressure", |_, j| water.excess(j).abs(), f64::INFINITY),
             None => Ok(()),
         }
     }

@@ -9,7 +9,7 @@ use crate::{
         strain_and_force::{NodalShare, conservative_force},
         viscosity::Viscosity,
     },
-    water::pore_pressure::Flow,
+    water::pore_water::PoreWater,
     weights::geometry::Geometry,
 };
 use sandboil_sph::Vec2;
@@ -158,7 +158,7 @@ pub struct NodalForces<'a> {
     /// Mass of each node, Mg/m.
     pub mass: &'a [f64],
     /// Pore water.
-    pub water: Option<&'a Flow>,
+    pub water: Option<&'a PoreWater>,
     /// Stresses of the printed operators.
     pub printed: Option<&'a PrintedStress>,
     /// Rayleigh damping.
@@ -171,7 +171,9 @@ impl NodalForces<'_> {
     /// Force of the excess pore pressure on node `j` (Eq. 6), kN/m.
     #[inline]
     pub fn of_water(&self, j: usize) -> Vec2 {
-        let (Some(flow), Some(tables)) = (self.water, &self.geometry.flow) else { return Vec2::zeros() };
+        // That of corners is part of the stress there.
+        let flow = self.water.and_then(PoreWater::nodes);
+        let (Some(flow), Some(tables)) = (flow, &self.geometry.flow) else { return Vec2::zeros() };
         match &self.geometry.printed {
             None => flow.force(tables, j),
             Some(printed) => {

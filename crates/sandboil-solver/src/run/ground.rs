@@ -4,21 +4,19 @@ use crate::{
     edges::base::{Base, Impedance},
     error::SolverError,
     section::{
-        description::{Model, Region, STRESS_NODES},
+        description::{Model, Region},
+        dual_lattice::DualLattice,
         edge_nodes::EdgeNodes,
         order::sorted,
         outline::{EdgesView, Outline, Walls},
+        stress_layout::{StressLayout, check_stress},
     },
     skeleton::{
         deformation::Deformation, phases::Phases, point::StressPoint, section_view::SectionView,
         soils::SoilField,
     },
-    water::pore_pressure::Flow,
-    weights::{
-        free_surface::free_surface,
-        geometry::Geometry,
-        points::{point_weights, stress_node_positions},
-    },
+    water::pore_water::PoreWater,
+    weights::{corners::move_corners, free_surface::free_surface, geometry::Geometry, points::point_weights},
 };
 use sandboil_soil::Stress;
 use sandboil_sph::Vec2;
@@ -49,7 +47,8 @@ impl Sharpness {
     pub fn new(model: &Model) -> Self {
         let Model { position, volume, outline, .. } = model;
         let edges = EdgesView::statics(outline);
-        let lattice = Geometry::build(model, position, volume, edges, None).sharpness(volume);
+        let lattice = Geometry::build(model, position, volume, edges);
+        let lattice = lattice.sharpness(&StressLayout::new(model), volume);
         Self { lattice, step_factor: 1.0 }
     }
 
@@ -84,12 +83,14 @@ pub struct Ground {
     pub phases: Phases,
     /// Mass of each node, Mg/m.
     pub mass: Vec<f64>,
-    /// Stress nodes.
+    /// Where the stress points are.
+    pub layout: StressLayout,
+    /// Stress points.
     pub points: Vec<StressPoint>,
-    /// Soil models of the stress nodes.
+    /// Soil models of the stress points.
     pub soil: SoilField,
     /// Pore pressure in a stage of moving ground.
-    pub water: Option<Flow>,
+    pub water: Option<PoreWater>,
     /// Weights at the present positions.
     pub geometry: Geometry,
     /// Sharpness of the weights, with large displacements.
@@ -106,6 +107,7 @@ impl Ground {
     /// Bad input, or elastic constants outside their range.
     pub fn new(model: &Model) -> Result<Self, SolverError> {
         model.validate()?;
+        check_stress(model)?;
         let (model, order) = sorted(model);
         let nodes = model.nodes();
         let phases = Phases::new(&model);
@@ -115,19 +117,20 @@ impl Ground {
             &model.position,
             phases.volume(),
             EdgesView { outline: &model.outline, walls },
-            None,
         );
-        let mut points: Vec<StressPoint> = (0..STRESS_NODES * nodes)
+        let layout = StressLayout::new(&model);
+        let mut points: Vec<StressPoint> = (0..layout.count(nodes))
             .map(|s| {
-                let Region { earth_pressure_coefficient, .. } =
-                    model.regions[model.region[s / STRESS_NODES] as usize];
+                let Region { earth_pressure_coefficient, .. } = model.regions[layout.region(&model, s)];
                 let vertical = -model.vertical_effective_stress[s];
                 let lateral = earth_pressure_coefficient * vertical;
                 let stress = Stress { xx: lateral, yy: vertical, xy: 0.0, zz: lateral };
-                StressPoint { stress, ..StressPoint::default() }
+                let volume = layout.volume(s, phases.volume());
+                StressPoint { stress, volume, ..StressPoint::default() }
             })
             .collect();
-        let soil = SoilField::elastic(&model, &mut points).map_err(|error| error.in_user_order(&order))?;
+        let soil =
+            SoilField::elastic(&model, &layout, &mut points).map_err(|error| error.in_user_order(&order))?;
         Ok(Self {
             order,
             edges: EdgeNodes::new(&model),
@@ -137,6 +140,7 @@ impl Ground {
             velocity: vec![Vec2::zeros(); nodes],
             acceleration: vec![Vec2::zeros(); nodes],
             mass: vec![0.0; nodes],
+            layout,
             points,
             soil,
             water: None,
@@ -188,6 +192,8 @@ impl Ground {
             edges: &self.edges,
             position: &self.position,
             phases: &self.phases,
+            layout: &self.layout,
+            points: &self.points,
             mass: &self.mass,
             geometry: &self.geometry,
             free_surface: self.free_surface.as_deref(),
@@ -195,7 +201,7 @@ impl Ground {
     }
 
     /// Updates the pore water with a view of the present section.
-    pub fn with_water(&mut self, outline: &Outline, update: impl FnOnce(&mut Flow, SectionView)) {
+    pub fn with_water(&mut self, outline: &Outline, update: impl FnOnce(&mut PoreWater, SectionView)) {
         let Some(mut water) = self.water.take() else { return };
         update(&mut water, self.view(outline));
         self.water = Some(water);
@@ -208,18 +214,31 @@ impl Ground {
         }
     }
 
+    /// Moves the corners of cells with the nodes since the last geometry. On base and sides they stay there, in the
+    /// components in which these are held.
+    pub fn move_corners(&mut self) {
+        let Self { layout: StressLayout::Dual(dual), geometry, position, walls, .. } = self else { return };
+        move_corners(dual, geometry, position, *walls);
+    }
+
     /// Updates volumes, densities and masses from the present strain, and restarts the deformation. Returns
     /// how many porosities were clipped to their range.
     pub fn update_volumes(&mut self) -> u64 {
-        let clips = self.phases.update_volumes(&self.points);
-        for (node, mass) in self.mass.iter_mut().enumerate() {
-            *mass = self.phases.mass(node);
-            let volume = self.phases.volume()[node];
-            for point in &mut self.points[STRESS_NODES * node..STRESS_NODES * (node + 1)] {
-                point.density = *mass / volume;
-                point.volume = volume / STRESS_NODES as f64;
-                point.deformation = Deformation::default();
+        let Self { phases, mass, layout, points, .. } = self;
+        let clips = phases.update_volumes(layout, points);
+        for (node, mass) in mass.iter_mut().enumerate() {
+            *mass = phases.mass(node);
+        }
+        if let Some(dual) = layout.dual() {
+            update_volumes(dual, points);
+        }
+        for (s, point) in points.iter_mut().enumerate() {
+            let node = layout.node(s);
+            point.density = mass[node] / phases.volume()[node];
+            if layout.dual().is_none() {
+                point.volume = layout.volume(s, phases.volume());
             }
+            point.deformation = Deformation::default();
         }
         clips
     }
@@ -229,7 +248,7 @@ impl Ground {
     pub fn update_surroundings(&mut self, threaded: bool) {
         let volume = self.phases.volume();
         if let Some(sharpness) = &mut self.sharpness {
-            sharpness.update(self.geometry.sharpness(volume));
+            sharpness.update(self.geometry.sharpness(&self.layout, volume));
         }
         if self.free_surface.is_some() && self.model.water.is_some() {
             let outline = self.outline();
@@ -263,7 +282,7 @@ impl Ground {
     /// Soil that refuses its stress.
     pub fn base_impedance(&self, base: &Base) -> Result<Vec<Impedance>, SolverError> {
         let points = self.edges.base_points(&self.model, &self.position);
-        let stress_position = stress_node_positions(&self.position, self.model.spacing);
+        let stress_position = self.layout.positions(&self.position, self.model.spacing);
         let weights = point_weights(&self.model, &stress_position, &points);
         self.edges
             .base
@@ -311,5 +330,19 @@ impl Ground {
             out[user] = value(j);
         }
         out
+    }
+}
+
+/// Updates the volumes of corners from their deformation since the last geometry; those of a group grow by the same ratio.
+fn update_volumes(dual: &DualLattice, points: &mut [StressPoint]) {
+    let ratio = |group: &Vec<u32>| {
+        let before: f64 = group.iter().map(|&s| points[s as usize].volume).sum();
+        let now = |&s: &u32| points[s as usize].volume * points[s as usize].deformation.volume_ratio();
+        group.iter().map(now).sum::<f64>() / before
+    };
+    let of_group: Vec<f64> = dual.groups.iter().map(ratio).collect();
+    for (point, group) in points.iter_mut().zip(&dual.group) {
+        let own = point.deformation.volume_ratio();
+        point.volume *= group.map_or(own, |group| of_group[group as usize]);
     }
 }

@@ -6,6 +6,8 @@ pub mod clock;
 pub mod domain;
 pub mod forces;
 pub mod ground;
+#[cfg(test)]
+mod limit_load_tests;
 pub mod moving;
 pub mod neighbour;
 pub mod observers;
@@ -13,4 +15,6 @@ pub mod readout;
 pub mod relaxing;
 pub mod renewal;
 pub mod simulation;
+#[cfg(test)]
+mod step_limit_tests;
 pub mod time_step;

@@ -13,6 +13,7 @@ use crate::{
         time_step::{PressureCoupling, TimeLimit},
     },
     stages::stage::{Displacements, Stage},
+    water::pore_water::PoreWater,
 };
 
 /// Who sets the time step and renews the geometry.
@@ -59,11 +60,11 @@ impl<N: Neighbour> Moving<N> {
         domain.move_nodes(dt);
         let is_due = lead == Lead::Own && self.is_sample_due(domain.clock.time + dt, dt);
         let stress_work = domain.update_stress(dt, is_due)?;
-        self.observers.account_strain(stress_work);
-        domain.update_water(dt)?;
+        let water_work = domain.update_water(dt, is_due)?;
+        self.observers.account_strain(stress_work, water_work);
         domain.clock.tick();
         let is_over = self.is_over(domain.clock.time, dt);
-        self.observers.end_step(domain, stress_work.after, is_due, is_over);
+        self.observers.end_step(domain, [stress_work.after, water_work.after], is_due, is_over);
         if self.is_check_due(domain.clock.step) {
             self.check(domain, lead)?;
         }
@@ -123,7 +124,7 @@ impl<N: Neighbour> Moving<N> {
     /// Checks finiteness, stability limit and geometry, every few steps.
     fn check(&mut self, domain: &mut Domain, lead: Lead) -> Result<(), SolverError> {
         self.guard(domain)?;
-        if let Some(flow) = &mut domain.ground.water {
+        if let Some(flow) = domain.ground.water.as_mut().and_then(PoreWater::nodes_mut) {
             flow.refresh(&domain.ground.model);
         }
         let limit = self.limit(domain);

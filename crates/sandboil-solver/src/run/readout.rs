@@ -15,9 +15,12 @@ use crate::{
         simulation::{Active, Driver},
         time_step::{Criterion, PressureCoupling, TimeLimit},
     },
-    section::description::{Operators, STRESS_NODES},
-    skeleton::{contacts::Contacts, point::StressPoint, printed::PrintedStress, rayleigh::RayleighDamping},
-    water::pore_pressure::Flow,
+    section::description::Operators,
+    skeleton::{
+        contacts::Contacts, point::StressPoint, printed::PrintedStress, rayleigh::RayleighDamping,
+        shared_volume::SharedStrain,
+    },
+    water::{pore_pressure::FlowScheme, pore_water::PoreWater},
 };
 use sandboil_soil::Stress;
 use sandboil_sph::Vec2;
@@ -59,7 +62,7 @@ impl<N: Neighbour> Driver<N> {
 
     /// How pore pressure is advanced in the stage.
     pub fn flow_scheme_name(&self) -> &'static str {
-        self.domain.ground.water.as_ref().map_or("none", Flow::scheme_name)
+        self.domain.ground.water.as_ref().map_or("none", |water| water.scheme().name())
     }
 
     /// Number of velocity nodes.
@@ -86,15 +89,15 @@ impl<N: Neighbour> Driver<N> {
         let Ground { model, water, soil, sharpness, .. } = ground;
         let stage = self.moving();
         let base = stage.and_then(|stage| stage.stage.compliant_base());
-        let is = |test: fn(&Flow) -> bool| water.as_ref().is_some_and(test);
+        let is = |test: fn(FlowScheme) -> bool| water.as_ref().is_some_and(|water| test(water.scheme()));
         let is_partly_saturated = model.saturation.iter().any(|share| *share < 1.0);
         vec![
             ("pore water", model.water.is_some()),
-            ("water diffusion", is(Flow::is_drained)),
-            ("water acceleration", is(Flow::has_acceleration_term)),
+            ("water diffusion", is(FlowScheme::is_drained)),
+            ("water acceleration", is(FlowScheme::has_acceleration_term)),
             (
                 "partial saturation",
-                is_partly_saturated || water.as_ref().is_some_and(|flow| flow.saturation().is_some()),
+                is_partly_saturated || water.as_ref().is_some_and(|water| water.saturation().is_some()),
             ),
             ("soil state", soil.plastic_points() > 0),
             ("base dashpots", base.is_some()),
@@ -107,7 +110,7 @@ impl<N: Neighbour> Driver<N> {
             ("run-out", sharpness.is_some()),
             (
                 "velocity filter",
-                model.numerics.operators == Operators::Conservative && model.numerics.velocity_filter > 0.0,
+                model.numerics.operators != Operators::Printed && model.numerics.velocity_filter > 0.0,
             ),
         ]
     }
@@ -118,7 +121,9 @@ impl<N: Neighbour> Driver<N> {
         let Ground { position, velocity, acceleration, points, geometry, phases, water, soil, .. } = ground;
         let motion = [position, velocity, acceleration, &workspace.water_force];
         let motion: usize = motion.map(|array| size_of_val(array.as_slice())).iter().sum();
-        let stress = size_of_val(points.as_slice()) + size_of_val(workspace.shares.as_slice());
+        let shared = workspace.shared.as_ref().map_or(0, SharedStrain::bytes);
+        let of_points = size_of_val(points.as_slice()) + size_of_val(workspace.shares.as_slice());
+        let stress = of_points + ground.layout.bytes() + shared;
         let stage = self.moving();
         let envelopes = stage.map(|stage| &stage.observers.envelopes);
         let envelope = |values: &Option<Vec<f64>>| values.as_deref().map(size_of_val);
@@ -129,7 +134,7 @@ impl<N: Neighbour> Driver<N> {
             ("stress", Some(stress)),
             ("geometry", Some(geometry.bytes())),
             ("phases", Some(phases.bytes())),
-            ("pore_pressure", water.as_ref().map(Flow::bytes)),
+            ("pore_pressure", water.as_ref().map(PoreWater::bytes)),
             ("soil_state", (soil.plastic_points() > 0).then(|| soil.state_bytes())),
             ("printed_stress", workspace.printed.as_ref().map(PrintedStress::bytes)),
             ("viscous_stress", damping.rayleigh.as_ref().map(RayleighDamping::bytes)),
@@ -177,7 +182,7 @@ impl<N: Neighbour> Driver<N> {
     pub fn excess_pore_pressure(&self) -> Option<Vec<f64>> {
         let Ground { model, water, .. } = &self.domain.ground;
         model.water?;
-        let excess = |j| water.as_ref().map_or(0.0, |flow| flow.excess(j));
+        let excess = |j| water.as_ref().map_or(0.0, |water| water.excess(j));
         Some(self.domain.ground.in_user_order(excess))
     }
 
@@ -188,21 +193,32 @@ impl<N: Neighbour> Driver<N> {
         Some(ground.in_user_order(saturation))
     }
 
-    /// Effective stress `(xx, yy, xy, zz)` of every velocity node's two stress nodes, kPa, tension positive.
-    pub fn stress(&self) -> Vec<[[f64; 4]; STRESS_NODES]> {
-        let ground = &self.domain.ground;
-        ground.in_user_order(|j| {
-            [0, 1].map(|k| {
-                let Stress { xx, yy, xy, zz } = ground.points[STRESS_NODES * j + k].stress;
-                [xx, yy, xy, zz]
-            })
+    /// Number of stress points.
+    pub fn stress_points(&self) -> usize {
+        self.domain.ground.points.len()
+    }
+
+    /// Effective stress `(xx, yy, xy, zz)` at the stress points of every node, kPa, tension positive: as many rows for each
+    /// node as it has stress points.
+    pub fn stress(&self) -> Vec<Vec<[f64; 4]>> {
+        self.at_stress_points(|point| {
+            let Stress { xx, yy, xy, zz } = point.stress;
+            [xx, yy, xy, zz]
         })
     }
 
-    /// Strain `(xx, yy, engineering xy)` since the stage began of every velocity node's two stress nodes.
-    pub fn strain(&self) -> Vec<[[f64; 3]; STRESS_NODES]> {
-        let ground = &self.domain.ground;
-        ground.in_user_order(|j| [0, 1].map(|k| ground.points[STRESS_NODES * j + k].strain))
+    /// Strain `(xx, yy, engineering xy)` since the stage began at the stress points of every node.
+    pub fn strain(&self) -> Vec<Vec<[f64; 3]>> {
+        self.at_stress_points(|point| point.strain)
+    }
+
+    fn at_stress_points<T>(&self, value: impl Fn(&StressPoint) -> T) -> Vec<Vec<T>> {
+        let Ground { layout, points, order, .. } = &self.domain.ground;
+        let mut rows: Vec<Vec<T>> = order.iter().map(|_| Vec::new()).collect();
+        for (j, &user) in order.iter().enumerate() {
+            rows[user] = layout.of_node(j).map(|(point, _)| value(&points[point])).collect();
+        }
+        rows
     }
 
     /// Largest excess pore pressure of every node since shaking began, kPa, if it is recorded.
@@ -214,7 +230,9 @@ impl<N: Neighbour> Driver<N> {
     /// Largest engineering shear strain of every node since shaking began, if it is recorded.
     pub fn largest_shear_strain(&self) -> Option<Vec<f64>> {
         let envelope = self.moving()?.observers.envelopes.strain.as_ref()?;
-        let largest = |j: usize| envelope[STRESS_NODES * j].max(envelope[STRESS_NODES * j + 1]);
+        let layout = &self.domain.ground.layout;
+        let largest =
+            |j: usize| layout.of_node(j).fold(0.0_f64, |most, (point, _)| most.max(envelope[point]));
         Some(self.domain.ground.in_user_order(largest))
     }
 
@@ -255,7 +273,8 @@ impl<N: Neighbour> Driver<N> {
 
     /// Nominal excess pore pressure `q J F^-T` of a node, kPa; zero without water.
     pub(crate) fn nominal_water(&self, node: usize) -> [f64; 4] {
-        self.domain.ground.water.as_ref().map_or([0.0; 4], |flow| flow.nominal(node))
+        let flow = self.domain.ground.water.as_ref().and_then(PoreWater::nodes);
+        flow.map_or([0.0; 4], |flow| flow.nominal(node))
     }
 
     /// Traction of the compliant base in the last step, mean over its points, kPa.
@@ -269,15 +288,13 @@ impl<N: Neighbour> Driver<N> {
 
     /// Density and small-strain wave speeds at a node's own stress.
     pub(crate) fn small_strain_impedance(&self, node: usize) -> Result<Impedance, SolverError> {
-        let [one, other] = [0, 1].map(|k| self.domain.ground.points[STRESS_NODES * node + k].stress);
-        let mean = |a: f64, b: f64| 0.5 * (a + b);
-        let stress = Stress {
-            xx: mean(one.xx, other.xx),
-            yy: mean(one.yy, other.yy),
-            xy: mean(one.xy, other.xy),
-            zz: mean(one.zz, other.zz),
-        };
         let ground = &self.domain.ground;
+        let mean = |component: fn(&Stress) -> f64| -> f64 {
+            let of_node = ground.layout.of_node(node);
+            of_node.map(|(point, share)| share * component(&ground.points[point].stress)).sum()
+        };
+        let stress =
+            Stress { xx: mean(|s| s.xx), yy: mean(|s| s.yy), xy: mean(|s| s.xy), zz: mean(|s| s.zz) };
         ground.impedance_at(node, stress).map_err(|error| error.in_user_order(&ground.order))
     }
 
@@ -293,7 +310,7 @@ impl<N: Neighbour> Driver<N> {
 
     /// Sets the excess pore pressure of nodes, kPa, and holds it in balance by a load.
     pub(crate) fn hold_excess(&mut self, excess: impl Iterator<Item = (usize, f64)>) {
-        if let Some(flow) = &mut self.domain.ground.water {
+        if let Some(flow) = self.domain.ground.water.as_mut().and_then(PoreWater::nodes_mut) {
             flow.set_excess(|own| excess.for_each(|(node, value)| own[node] = value));
         }
         self.domain.balance_under_load();

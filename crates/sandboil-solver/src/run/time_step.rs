@@ -3,10 +3,11 @@
 use crate::{
     section::description::{Model, Operators},
     skeleton::rayleigh::Rayleigh,
+    water::{cell_conduction, pore_pressure::FlowScheme, pore_water::PoreWater},
     weights::lattice::lattice,
 };
 use sandboil_sph::{
-    Vec2, WendlandQuintic,
+    LeastSquaresFit, Vec2, WendlandQuintic,
     operators::{corrected_gradient, laplacian_factor},
 };
 
@@ -25,6 +26,19 @@ pub const FREE_UNDRAINED_COEFFICIENT: f64 = 0.9;
 /// Damping ratio of the fastest wave for artificial viscosity with `alpha = 1`: its rate is at most `2 alpha
 /// c / h`.
 pub const VISCOSITY_RATIO: f64 = 0.5;
+/// The same limits on the dual lattice. Free blocks of ordered nodes are stable up to 1.07, of nodes displaced by a tenth of
+/// a spacing up to 0.99.
+pub const DUAL_DRAINED_COEFFICIENT: f64 = 0.98;
+/// With prescribed pressure at the surface, up to 1.36 and 1.26.
+pub const DUAL_UNDRAINED_COEFFICIENT: f64 = 1.2;
+/// Without, up to 1.05 and 0.97.
+pub const DUAL_FREE_UNDRAINED_COEFFICIENT: f64 = 0.96;
+/// Limit of the undrained wave in an unbounded dual lattice over `h / c_u`.
+const DUAL_UNBOUNDED_COEFFICIENT: f64 = 1.6;
+/// Smoothing length over the spacing above which the limits of the dual lattice no longer grow with it.
+const DUAL_WIDEST: f64 = 1.2;
+/// Explicit diffusion between the corners of cells: `dt <= 0.48 dx^2 C / k`; 0.5 inside a lattice.
+pub const DUAL_DIFFUSION_COEFFICIENT: f64 = 0.48;
 /// Drainage of a few run-out nodes that touch only each other, over that of the lattice: through the surface,
 /// `2/dx^2` of up to `8/dx^2`.
 pub const FREE_SURFACE_DRAINAGE: f64 = 0.25;
@@ -32,6 +46,9 @@ pub const FREE_SURFACE_DRAINAGE: f64 = 0.25;
 pub const DIFFUSION_COEFFICIENT: f64 = 0.65;
 /// Largest eigenvalue of the velocity filter over `xi C_s / dx`.
 pub const FILTER_EIGENVALUE: f64 = 1.05;
+/// The same on the dual lattice, as far as it acts on the fastest waves: there the filter is strongest on waves that have
+/// little stiffness.
+pub const DUAL_FILTER_EIGENVALUE: f64 = 0.25;
 /// Largest shear-wave over compression-wave speed of a soil: that of Poisson's ratio zero.
 pub const LARGEST_SPEED_RATIO: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Damping ratio of the fastest wave above which the limit of the viscous part alone, `dt < 1/(xi w)`, is
@@ -101,6 +118,17 @@ pub enum PressureCoupling {
     Implicit,
 }
 
+impl PressureCoupling {
+    /// How the pressure of a stage's pore water is advanced.
+    pub fn of(water: Option<&PoreWater>) -> Self {
+        match water.map(PoreWater::scheme) {
+            None => Self::None,
+            Some(FlowScheme::Implicit) => Self::Implicit,
+            Some(_) => Self::Explicit,
+        }
+    }
+}
+
 /// Spectrum of the pressure operators of Eq. 7 on the undeformed lattice.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PressureSpectrum {
@@ -111,10 +139,11 @@ pub struct PressureSpectrum {
 impl PressureSpectrum {
     /// Samples the spectrum of the model's lattice.
     pub fn new(model: &Model) -> Self {
-        let kernel = WendlandQuintic::new(model.smoothing_length());
-        let members = lattice(model, Vec2::zeros());
-        let corrected = corrected_gradient(&members, kernel).unwrap_or_default();
-        let factor = laplacian_factor(&members, &corrected);
+        let symbol = if model.numerics.operators == Operators::Dual {
+            symbols_at_corners(model)
+        } else {
+            symbols_at_nodes(model)
+        };
         let diagonal = Vec2::new(1.0 / model.spacing.x, 1.0 / model.spacing.y);
         let directions = [Vec2::new(0.0, diagonal.y), Vec2::new(diagonal.x, 0.0), diagonal]
             .map(|d| d * std::f64::consts::PI);
@@ -123,16 +152,7 @@ impl PressureSpectrum {
             .flat_map(|d| {
                 (1..=SPECTRUM_SAMPLES).map(move |k| d * (f64::from(k) / f64::from(SPECTRUM_SAMPLES)))
             })
-            .map(|wave| {
-                let gradient: Vec2 =
-                    members.iter().zip(&corrected).map(|(m, g)| g * wave.dot(&m.offset).sin()).sum();
-                let laplacian: f64 = members
-                    .iter()
-                    .zip(&factor)
-                    .map(|(m, f)| 2.0 * f * (1.0 - wave.dot(&m.offset).cos()))
-                    .sum();
-                (gradient.norm_squared(), laplacian)
-            })
+            .map(symbol)
             .collect();
         Self { eigenvalues }
     }
@@ -150,13 +170,44 @@ impl PressureSpectrum {
     }
 }
 
+/// Squared gradient and Laplacian of a wave by the operators at nodes, 1/m2.
+fn symbols_at_nodes(model: &Model) -> Box<dyn Fn(Vec2) -> (f64, f64)> {
+    let kernel = WendlandQuintic::new(model.smoothing_length());
+    let members = lattice(model, Vec2::zeros());
+    let corrected = corrected_gradient(&members, kernel).unwrap_or_default();
+    let factor = laplacian_factor(&members, &corrected);
+    Box::new(move |wave| {
+        let gradient: Vec2 = members.iter().zip(&corrected).map(|(m, g)| g * wave.dot(&m.offset).sin()).sum();
+        let laplacian: f64 =
+            members.iter().zip(&factor).map(|(m, f)| 2.0 * f * (1.0 - wave.dot(&m.offset).cos())).sum();
+        (gradient.norm_squared(), laplacian)
+    })
+}
+
+/// The same by the operators at the corners of cells.
+fn symbols_at_corners(model: &Model) -> Box<dyn Fn(Vec2) -> (f64, f64)> {
+    let (kernel, spacing) = (WendlandQuintic::new(model.smoothing_length()), model.spacing);
+    let members = lattice(model, spacing * 0.5);
+    let fit = LeastSquaresFit::new(&members, kernel).ok();
+    let weights: Vec<(Vec2, Vec2)> = fit
+        .iter()
+        .flat_map(|fit| members.iter().enumerate().map(|(k, m)| (m.offset, fit.weight(k, m).gradient)))
+        .collect();
+    Box::new(move |wave| {
+        let gradient: Vec2 = weights.iter().map(|(offset, g)| g * wave.dot(offset).sin()).sum();
+        (gradient.norm_squared(), cell_conduction::symbol(spacing, wave))
+    })
+}
+
 /// Damping ratio of the velocity filter's largest eigenvalue on the fastest wave, of frequency `2 c_d / h`; the
 /// printed set has none.
 pub fn filter_ratio(model: &Model) -> f64 {
-    if model.numerics.operators == Operators::Printed {
-        return 0.0;
-    }
-    let damping = FILTER_EIGENVALUE * model.numerics.velocity_filter * LARGEST_SPEED_RATIO;
+    let eigenvalue = match model.numerics.operators {
+        Operators::Conservative => FILTER_EIGENVALUE,
+        Operators::Dual => DUAL_FILTER_EIGENVALUE,
+        Operators::Printed => 0.0,
+    };
+    let damping = eigenvalue * model.numerics.velocity_filter * LARGEST_SPEED_RATIO;
     0.25 * damping * model.numerics.smoothing_ratio
 }
 
@@ -216,11 +267,13 @@ impl<'a> RegionWaves<'a> {
 
     /// Limit of a wave without damping, s.
     fn undamped(&self, coefficient: f64, stiffness: f64) -> f64 {
-        coefficient * self.model.smoothing_length() / (stiffness / self.density).sqrt()
+        let h = self.model.smoothing_length();
+        let length = if self.is_dual() { h.min(DUAL_WIDEST * self.model.mean_spacing()) } else { h };
+        coefficient * length / (stiffness / self.density).sqrt()
     }
 
     fn undamped_drained(&self) -> f64 {
-        self.undamped(DRAINED_COEFFICIENT, self.skeleton_stiffness)
+        self.undamped(self.drained_coefficient(), self.skeleton_stiffness)
     }
 
     /// Ratio of Rayleigh damping, `rate / (2 w)`, for a wave with the undamped limit `2/w`, s.
@@ -238,7 +291,7 @@ impl<'a> RegionWaves<'a> {
     }
 
     fn drained(&self) -> TimeLimit {
-        self.damped(DRAINED_COEFFICIENT, self.skeleton_stiffness, Criterion::DrainedWave)
+        self.damped(self.drained_coefficient(), self.skeleton_stiffness, Criterion::DrainedWave)
     }
 
     fn undrained(&self) -> TimeLimit {
@@ -254,18 +307,29 @@ impl<'a> RegionWaves<'a> {
         self.model.pressure_diffusivity(self.region, |k| k.major)
     }
 
+    fn is_dual(&self) -> bool {
+        self.model.numerics.operators == Operators::Dual
+    }
+
+    fn drained_coefficient(&self) -> f64 {
+        if self.is_dual() { DUAL_DRAINED_COEFFICIENT } else { DRAINED_COEFFICIENT }
+    }
+
     fn undrained_coefficient(&self) -> f64 {
-        if self.largest_diffusivity() > 0.0 && self.limits.surface_is_tied {
-            UNDRAINED_COEFFICIENT
-        } else {
-            FREE_UNDRAINED_COEFFICIENT
+        let is_tied = self.largest_diffusivity() > 0.0 && self.limits.surface_is_tied;
+        match (self.is_dual(), is_tied) {
+            (false, true) => UNDRAINED_COEFFICIENT,
+            (false, false) => FREE_UNDRAINED_COEFFICIENT,
+            (true, true) => DUAL_UNDRAINED_COEFFICIENT,
+            (true, false) => DUAL_FREE_UNDRAINED_COEFFICIENT,
         }
     }
 
     /// Limit of the waves and of explicit diffusion together.
     fn with_explicit_diffusion(&self, waves: TimeLimit) -> TimeLimit {
         let area = self.model.spacing.x.min(self.model.spacing.y).powi(2);
-        let diffusion = DIFFUSION_COEFFICIENT * area / self.largest_diffusivity();
+        let coefficient = if self.is_dual() { DUAL_DIFFUSION_COEFFICIENT } else { DIFFUSION_COEFFICIENT };
+        let diffusion = coefficient * area / self.largest_diffusivity();
         let dt = (waves.dt.powi(-2) + diffusion.powi(-2)).powf(-0.5);
         let criterion = if diffusion < waves.dt { Criterion::Diffusion } else { waves.criterion };
         TimeLimit { dt, criterion }
@@ -279,7 +343,8 @@ impl<'a> RegionWaves<'a> {
         let drainage = if self.limits.surface_is_tied { 1.0 } else { FREE_SURFACE_DRAINAGE };
         // In anisotropic soil drainage is slowest along the smallest conductivity.
         let diffusivity = drainage * self.model.pressure_diffusivity(self.region, |k| k.minor);
-        let surface_factor = (UNDRAINED_COEFFICIENT / self.undrained_coefficient()).powi(2);
+        let of_lattice = if self.is_dual() { DUAL_UNBOUNDED_COEFFICIENT } else { UNDRAINED_COEFFICIENT };
+        let surface_factor = (of_lattice / self.undrained_coefficient()).powi(2);
         let water = surface_factor * self.water_stiffness() / self.density;
         let is_stable = |dt: f64| {
             let share = self.limits.spectrum.share(water, diffusivity, dt / damping);

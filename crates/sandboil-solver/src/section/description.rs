@@ -86,6 +86,9 @@ pub struct Water {
 pub enum Operators {
     /// Least-squares gradient at the stress nodes and its exact transpose as force.
     Conservative,
+    /// The same with one stress point a node, at the corners of the cells, and one measure of volume for soil and
+    /// water.
+    Dual,
     /// The paper's Eqs 6 and 8 to 11 with the corrections named in the theory page.
     Printed,
 }
@@ -139,7 +142,7 @@ impl Numerics {
     /// and need a rebuild only for new neighbours; the error of the printed ones is as large as the strain.
     pub fn geometry_strain_limit(&self) -> f64 {
         self.geometry_strain_limit.unwrap_or(match self.operators {
-            Operators::Conservative => 0.2,
+            Operators::Conservative | Operators::Dual => 0.2,
             Operators::Printed => 0.02,
         })
     }
@@ -161,9 +164,8 @@ pub struct Model {
     pub regions: Vec<Region>,
     /// Elevation of the ground surface above each velocity node, m.
     pub surface_elevation: Vec<f64>,
-    /// Vertical effective stress of the initial geostatic state at each stress node, kPa, compression
-    /// positive. Stress nodes `2 i` and `2 i + 1` belong to velocity node `i`, at plus and minus
-    /// [`stress_node_offset`].
+    /// Vertical effective stress of the initial geostatic state at each stress point, kPa, compression
+    /// positive, in the order of [`stress_positions`](crate::stress_positions).
     pub vertical_effective_stress: Vec<f64>,
     /// Pore pressure at rest at each velocity node, kPa, negative in suction; read only when there is water.
     pub pore_pressure: Vec<f64>,
@@ -238,7 +240,7 @@ impl Model {
         })
     }
 
-    /// Checks every array and number.
+    /// Checks every array and number, except the number of values at stress points.
     ///
     /// # Errors
     /// [`SolverError::Shape`] or [`SolverError::InvalidInput`] for the first error found.
@@ -248,7 +250,6 @@ impl Model {
             ("volume", self.volume.len(), nodes),
             ("region", self.region.len(), nodes),
             ("surface_elevation", self.surface_elevation.len(), nodes),
-            ("vertical_effective_stress", self.vertical_effective_stress.len(), STRESS_NODES * nodes),
             ("pore_pressure", self.pore_pressure.len(), if self.water.is_some() { nodes } else { 0 }),
             ("saturation", self.saturation.len(), if self.saturation.is_empty() { 0 } else { nodes }),
         ];

@@ -2,7 +2,9 @@
 
 pub mod bins;
 pub mod description;
+pub mod dual_lattice;
 pub mod edge_nodes;
 pub mod node_id;
 pub mod order;
 pub mod outline;
+pub mod stress_layout;

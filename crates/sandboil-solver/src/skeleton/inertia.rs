@@ -214,7 +214,7 @@ pub(crate) mod tests {
         pub fn new(model: &Model, walls: Walls, moduli: &[[f64; 2]], density: f64) -> Self {
             let edges = EdgesView { outline: &model.outline, walls };
             let nodes = model.nodes();
-            let mut geometry = Geometry::build(model, &model.position, &vec![1.0; nodes], edges, None);
+            let mut geometry = Geometry::build(model, &model.position, &vec![1.0; nodes], edges);
             let point = |s: usize| {
                 let [shear_modulus, stiffness] = moduli[model.region[s / STRESS_NODES] as usize];
                 StressPoint { density, volume: 0.5, shear_modulus, stiffness, ..StressPoint::default() }
@@ -381,7 +381,7 @@ pub(crate) mod tests {
             outline: &model.outline,
             walls: Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]),
         };
-        let geometry = Geometry::build(&model, &model.position, &vec![1.0; nodes], edges, None);
+        let geometry = Geometry::build(&model, &model.position, &vec![1.0; nodes], edges);
         let points =
             vec![StressPoint { density: 2.0, volume: 0.5, ..StressPoint::default() }; STRESS_NODES * nodes];
         let mass: Vec<f64> = (0..nodes).map(|j| 1.0 + 0.01 * j as f64).collect();

@@ -9,8 +9,9 @@ pub mod point;
 pub mod printed;
 pub mod rayleigh;
 pub mod section_view;
+pub mod shared_volume;
 pub mod soils;
 #[cfg(test)]
-mod spectrum_tests;
+pub mod spectrum_tests;
 pub mod strain_and_force;
 pub mod viscosity;

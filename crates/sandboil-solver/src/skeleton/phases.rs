@@ -6,7 +6,7 @@
 //! V`.
 
 use crate::{
-    section::description::{Model, STRESS_NODES},
+    section::{description::Model, stress_layout::StressLayout},
     skeleton::point::StressPoint,
 };
 use std::ops::RangeInclusive;
@@ -82,12 +82,15 @@ impl Phases {
 
     /// Updates the volumes from the strain of the stress nodes. Returns how many porosities were clipped to
     /// their range.
-    pub fn update_volumes(&mut self, points: &[StressPoint]) -> u64 {
+    pub fn update_volumes(&mut self, layout: &StressLayout, points: &[StressPoint]) -> u64 {
         let mut clipped = 0;
         for (node, volume) in self.volume.iter_mut().enumerate() {
-            let own = &points[STRESS_NODES * node..STRESS_NODES * (node + 1)];
-            let strain: f64 = own.iter().map(|point| point.strain[0] + point.strain[1]).sum();
-            let wanted = self.unstrained[node] * (strain / STRESS_NODES as f64).exp();
+            let of_point = |(point, share): (usize, f64)| {
+                let [xx, yy, _] = points[point].strain;
+                share * (xx + yy)
+            };
+            let strain: f64 = layout.of_node(node).map(of_point).sum();
+            let wanted = self.unstrained[node] * strain.exp();
             let least = self.solid[node] / (1.0 - POROSITY_RANGE.start());
             let most = self.solid[node] / (1.0 - POROSITY_RANGE.end());
             // A soil that starts outside the range may keep its porosity.
@@ -112,7 +115,7 @@ impl Phases {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::square_block;
+    use crate::{section::description::STRESS_NODES, testing::square_block};
 
     #[test]
     fn porosity_conserves_the_volume_of_the_grains() {
@@ -123,7 +126,7 @@ mod tests {
         for point in &mut points[..STRESS_NODES] {
             point.strain = [0.06, -0.16, 0.3];
         }
-        assert_eq!(phases.update_volumes(&points), 0);
+        assert_eq!(phases.update_volumes(&StressLayout::Diagonal, &points), 0);
         // Eq. 1 integrated: (1 - n) V is constant, V = V_0 exp(volume strain).
         assert!((phases.volume()[0] - (-0.1_f64).exp()).abs() < 1e-15);
         assert!((1.0 - phases.porosity(0) - 0.5 * 0.1_f64.exp()).abs() < 1e-15);
@@ -139,7 +142,7 @@ mod tests {
         for point in &mut points {
             point.strain = [-5.0, 0.0, 0.0];
         }
-        assert_eq!(phases.update_volumes(&points), model.nodes() as u64);
+        assert_eq!(phases.update_volumes(&StressLayout::Diagonal, &points), model.nodes() as u64);
         assert!((phases.porosity(0) - 0.05).abs() < 1e-14);
     }
 }

@@ -8,6 +8,9 @@ use sandboil_soil::Stress;
 pub struct StressPoint {
     /// Effective stress, kPa, tension positive.
     pub stress: Stress,
+    /// What the forces take beside the effective stress, kPa, compression positive: the excess pore pressure of stress
+    /// points on the dual lattice, and what the point's group carries of its mean stress.
+    pub neutral: f64,
     /// Total strain `(xx, yy, engineering xy)` since the stage began, tension positive.
     pub strain: [f64; 3],
     /// Current elastic shear modulus, kPa.
@@ -20,6 +23,15 @@ pub struct StressPoint {
     pub volume: f64,
     /// Deformation since then.
     pub deformation: Deformation,
+}
+
+impl StressPoint {
+    /// Stress from which the forces follow, kPa, tension positive.
+    #[inline]
+    pub fn total_stress(&self) -> Stress {
+        let Stress { xx, yy, .. } = self.stress;
+        Stress { xx: xx - self.neutral, yy: yy - self.neutral, ..self.stress }
+    }
 }
 
 /// Engineering shear strain of the largest in-plane Mohr circle.

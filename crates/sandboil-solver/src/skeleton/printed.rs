@@ -92,7 +92,7 @@ mod tests {
         model.region = (0..model.nodes()).map(|node| u32::from(node >= 18)).collect();
         let phases = Phases::new(&model);
         let edges = EdgesView::statics(&model.outline);
-        let geometry = Geometry::build(&model, &model.position, phases.volume(), edges, None);
+        let geometry = Geometry::build(&model, &model.position, phases.volume(), edges);
         let points: Vec<StressPoint> = (0..STRESS_NODES * model.nodes())
             .map(|s| StressPoint {
                 stress: Stress { xx: s as f64, yy: 2.0 * s as f64, xy: -0.5 * s as f64, zz: 0.0 },

@@ -186,7 +186,7 @@ mod tests {
             outline: &model.outline,
             walls: Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]),
         };
-        let geometry = Geometry::build(&model, &model.position, &vec![1.0; nodes], edges, None);
+        let geometry = Geometry::build(&model, &model.position, &vec![1.0; nodes], edges);
         let velocity: Vec<Vec2> =
             (0..nodes).map(|j| Vec2::new((1.3 * j as f64).sin(), (2.1 * j as f64).cos())).collect();
         let still = vec![Vec2::zeros(); nodes];

@@ -5,8 +5,9 @@ use crate::{
         description::Model,
         edge_nodes::EdgeNodes,
         outline::{Outline, Walls},
+        stress_layout::StressLayout,
     },
-    skeleton::phases::Phases,
+    skeleton::{phases::Phases, point::StressPoint},
     weights::geometry::Geometry,
 };
 use sandboil_sph::Vec2;
@@ -26,6 +27,10 @@ pub struct SectionView<'a> {
     pub position: &'a [Vec2],
     /// Volumes, porosities and densities.
     pub phases: &'a Phases,
+    /// Where its stress points are.
+    pub layout: &'a StressLayout,
+    /// Its stress points.
+    pub points: &'a [StressPoint],
     /// Mass of each node, Mg/m.
     pub mass: &'a [f64],
     /// Weights at the present positions.

@@ -3,9 +3,10 @@
 use crate::{
     error::SolverError,
     parallel::{Rows, chunks, for_each_chunk},
-    section::description::{Model, STRESS_NODES},
+    section::{description::Model, stress_layout::StressLayout},
     skeleton::{
         point::StressPoint,
+        shared_volume::SharedStrain,
         strain_and_force::{NodalShare, motion},
     },
     weights::geometry::Geometry,
@@ -124,8 +125,12 @@ pub struct SoilField {
 /// Input of a step of the soil.
 #[derive(Clone, Copy)]
 pub struct StrainStep<'a> {
+    /// Stress points.
+    pub layout: &'a StressLayout,
     /// Weights.
     pub geometry: &'a Geometry,
+    /// Volume strains that groups of points share.
+    pub shared: Option<&'a SharedStrain>,
     /// Velocities at mid-step, m/s.
     pub velocity: &'a [Vec2],
     /// Strength `xi / dx` of the velocity filter, 1/m.
@@ -181,7 +186,7 @@ impl<M: SoilModel> Plastic for PlasticRows<M> {
         outcomes: &mut [Outcome],
     ) {
         let model = &self.model;
-        let StrainStep { geometry, velocity, filter, dt, integrator, with_after } = *step;
+        let StrainStep { shared, geometry, velocity, filter, dt, integrator, with_after, .. } = *step;
         let rows = Rows { a: rows.points, b: rows.shares, c: &mut self.states };
         for_each_chunk(threaded, rows, outcomes, |first, rows, outcome| {
             *outcome = Outcome::default();
@@ -189,7 +194,7 @@ impl<M: SoilModel> Plastic for PlasticRows<M> {
                 let (point, state) = (&mut rows.a[k], &mut rows.c[k]);
                 let s = first_row + first + k;
                 let motion = motion(geometry, s, velocity);
-                let increment = motion.advance(&mut point.deformation, dt);
+                let increment = shared_increment(shared, s, motion.advance(&mut point.deformation, dt));
                 match check_size(&increment, largest_strain)
                     .and_then(|()| model.update(state, &increment, integrator))
                 {
@@ -240,18 +245,28 @@ fn check_size(increment: &StrainIncrement, limit: f64) -> Result<(), SoilError> 
     Ok(())
 }
 
+/// The strain of the soil at a point: that of the motion, with the volume strain of the point's group.
+#[inline]
+fn shared_increment(
+    shared: Option<&SharedStrain>,
+    point: usize,
+    increment: StrainIncrement,
+) -> StrainIncrement {
+    shared.map_or(increment, |shared| shared.applied(point, increment))
+}
+
 fn stiffness(moduli: Moduli) -> f64 {
     moduli.bulk + 4.0 / 3.0 * moduli.shear
 }
 
-/// Contiguous stress-node rows of each region; nodes are sorted by region.
-fn groups(model: &Model) -> Vec<(usize, Range<usize>)> {
+/// Contiguous rows of the stress points of each region; stress points are sorted by region.
+fn groups(model: &Model, layout: &StressLayout) -> Vec<(usize, Range<usize>)> {
     let mut groups: Vec<(usize, Range<usize>)> = Vec::new();
-    for (node, &region) in model.region.iter().enumerate() {
-        let rows = STRESS_NODES * node..STRESS_NODES * (node + 1);
+    for point in 0..layout.count(model.nodes()) {
+        let region = layout.region(model, point);
         match groups.last_mut() {
-            Some((last, span)) if *last == region as usize => span.end = rows.end,
-            _ => groups.push((region as usize, rows)),
+            Some((last, span)) if *last == region => span.end = point + 1,
+            _ => groups.push((region, point..point + 1)),
         }
     }
     groups
@@ -262,12 +277,16 @@ impl SoilField {
     ///
     /// # Errors
     /// [`SolverError::Soil`] where an elastic constant is outside its range.
-    pub fn elastic(model: &Model, points: &mut [StressPoint]) -> Result<Self, SolverError> {
-        Self::build(model, |region, rows| {
+    pub fn elastic(
+        model: &Model,
+        layout: &StressLayout,
+        points: &mut [StressPoint],
+    ) -> Result<Self, SolverError> {
+        Self::build(model, layout, |region, rows| {
             let soil = &model.regions[region];
             let law = Elastic::from_poisson(soil.soil.static_shear_modulus(), soil.static_poisson_ratio);
             let law =
-                law.map_err(|source| SolverError::Soil { region, node: rows.start / STRESS_NODES, source })?;
+                law.map_err(|source| SolverError::Soil { region, node: layout.node(rows.start), source })?;
             for point in &mut points[rows] {
                 set_moduli(point, law.constants());
             }
@@ -282,15 +301,16 @@ impl SoilField {
     /// [`SolverError::Soil`] where a model refuses the stress.
     pub fn plastic(
         model: &Model,
+        layout: &StressLayout,
         points: &mut [StressPoint],
         void_ratio: Option<f64>,
     ) -> Result<Self, SolverError> {
         let mut inadmissible_starts = 0;
-        let field = Self::build(model, |region, rows| {
+        let field = Self::build(model, layout, |region, rows| {
             let soil = &model.regions[region].soil;
             let Soil::Elastic(elastic) = soil else {
                 let (rows, replaced) =
-                    with_model!(soil, law => plastic_rows(law, region, rows, points, void_ratio)?);
+                    with_model!(soil, law => plastic_rows(law, region, layout, rows, points, void_ratio)?);
                 inadmissible_starts += replaced;
                 return Ok(Law::Plastic(soil.clone(), rows));
             };
@@ -304,9 +324,10 @@ impl SoilField {
 
     fn build(
         model: &Model,
+        layout: &StressLayout,
         mut law: impl FnMut(usize, Range<usize>) -> Result<Law, SolverError>,
     ) -> Result<Self, SolverError> {
-        let groups = groups(model)
+        let groups = groups(model, layout)
             .into_iter()
             .map(|(region, rows)| Ok(Group { region, law: law(region, rows.clone())?, rows }))
             .collect::<Result<Vec<_>, SolverError>>()?;
@@ -332,7 +353,7 @@ impl SoilField {
         step: &StrainStep,
         StressRows { points, shares }: StressRows,
     ) -> Result<(UpdateReport, StressWork), SolverError> {
-        let StrainStep { geometry, velocity, filter, dt, with_after, .. } = *step;
+        let StrainStep { layout, shared, geometry, velocity, filter, dt, with_after, .. } = *step;
         let (mut total, mut work) = (UpdateReport::default(), StressWork::default());
         for group in &mut self.groups {
             let first_row = group.rows.start;
@@ -352,7 +373,8 @@ impl SoilField {
                         for (k, (point, share)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
                             let s = first_row + first + k;
                             let motion = motion(geometry, s, velocity);
-                            let increment = motion.advance(&mut point.deformation, dt);
+                            let increment =
+                                shared_increment(shared, s, motion.advance(&mut point.deformation, dt));
                             let before = point.stress;
                             point.stress = elastic.moved(&before, &increment);
                             work.add(&before, point, &increment, with_after);
@@ -367,7 +389,7 @@ impl SoilField {
                     law.step(threaded, step, self.largest_strain, first_row, rows, outcomes);
                     for outcome in &*outcomes {
                         if let Some((s, source)) = &outcome.failure {
-                            let (region, node) = (group.region, s / STRESS_NODES);
+                            let (region, node) = (group.region, layout.node(*s));
                             return Err(SolverError::Soil { region, node, source: source.clone() });
                         }
                         total.merge(&outcome.report);
@@ -380,6 +402,11 @@ impl SoilField {
             }
         }
         Ok((total, work))
+    }
+
+    /// Region and rows of each group.
+    pub fn rows(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
+        self.groups.iter().map(|group| (group.region, group.rows.clone()))
     }
 
     /// Void ratio at stress node `s`, if its model knows it.
@@ -419,6 +446,7 @@ impl SoilField {
 fn plastic_rows<M: SoilModel + 'static>(
     law: &M,
     region: usize,
+    layout: &StressLayout,
     rows: Range<usize>,
     points: &mut [StressPoint],
     void_ratio: Option<f64>,
@@ -429,7 +457,7 @@ fn plastic_rows<M: SoilModel + 'static>(
         replaced += u64::from(!law.carries(&points[s].stress));
         let state = law.initialise(points[s].stress, void_ratio).map_err(|source| SolverError::Soil {
             region,
-            node: s / STRESS_NODES,
+            node: layout.node(s),
             source,
         })?;
         points[s].stress = law.stress(&state);

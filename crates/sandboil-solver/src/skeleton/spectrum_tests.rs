@@ -40,7 +40,7 @@ impl Lattice {
         model.numerics.smoothing_ratio = smoothing_ratio;
         let volume = vec![1.0; model.nodes()];
         let edges = EdgesView::statics(&model.outline);
-        let geometry = Geometry::build(&model, &model.position, &volume, edges, None);
+        let geometry = Geometry::build(&model, &model.position, &volume, edges);
         let centre = SIDE * (SIDE / 2) + SIDE / 2;
         let origin = model.position[centre];
         let stencil = |s: usize| {
@@ -204,7 +204,7 @@ pub fn elastic_matrix(model: &Model, lame: f64) -> DMatrix<f64> {
     let phases = Phases::new(model);
     let volume = phases.volume().to_vec();
     let edges = EdgesView::statics(&model.outline);
-    let geometry = Geometry::build(model, &model.position, &volume, edges, None);
+    let geometry = Geometry::build(model, &model.position, &volume, edges);
     let nodes = model.nodes();
     let mut matrix = DMatrix::zeros(2 * nodes, 2 * nodes);
     let mut points =
@@ -324,7 +324,7 @@ pub fn filter_matrix(geometry: &Geometry, points: &[StressPoint], strength: f64)
 fn strength_of_the_velocity_filter() {
     let model = square_block(10);
     let edges = EdgesView::statics(&model.outline);
-    let geometry = Geometry::build(&model, &model.position, &vec![1.0; model.nodes()], edges, None);
+    let geometry = Geometry::build(&model, &model.position, &vec![1.0; model.nodes()], edges);
     for (shear_modulus, speed) in [(1e4, 100.0), (1.0, 20.0), (0.0, 20.0)] {
         let point = StressPoint { density: 1.0, volume: 0.5, shear_modulus, ..StressPoint::default() };
         let matrix = filter_matrix(&geometry, &vec![point; STRESS_NODES * model.nodes()], 0.1);

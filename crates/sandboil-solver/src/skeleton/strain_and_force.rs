@@ -97,7 +97,7 @@ impl Motion {
         let [c_xx, c_xy, c_yy] = covariance;
         let linear = |g: Vec2| [g.x * c_xx + g.y * c_xy, g.x * c_xy + g.y * c_yy];
         let (f_x, f_y) = (linear(self.free_x), linear(self.free_y));
-        let [xx, xy, yx, yy] = point.deformation.cofactor().nominal(&point.stress);
+        let [xx, xy, yx, yy] = point.deformation.cofactor().nominal(&point.total_stress());
         NodalShare {
             tensor: [
                 point.volume * xx - coefficient * f_x[0],
@@ -130,8 +130,8 @@ pub fn conservative_force(
         force += (share.mean_velocity - velocity) * (share.filter * weight.share);
     }
     for (s, weight) in geometry.wall.transposed.iter_row(j) {
-        let StressPoint { stress, volume, deformation, .. } = &points[s];
-        force -= weight.contract(deformation.cofactor().nominal(stress)) * *volume;
+        let point = &points[s];
+        force -= weight.contract(point.deformation.cofactor().nominal(&point.total_stress())) * point.volume;
     }
     force
 }
@@ -181,7 +181,7 @@ pub(crate) mod tests {
         const STEPS: u32 = 200;
         let model = square_block(6);
         let edges = EdgesView::statics(&model.outline);
-        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], edges, None);
+        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], edges);
         let velocity: Vec<Vec2> = model.position.iter().map(|x| Vec2::new(0.3 * x.x, 0.0)).collect();
         let mut deformation = Deformation::default();
         let strain: f64 = (0..STEPS)
@@ -206,7 +206,7 @@ pub(crate) mod tests {
                     outline: &model.outline,
                     walls: Walls::shaken(&model.outline, condition, [false; 2]),
                 };
-                let geometry = Geometry::build(&model, &model.position, &[1.0; 36], edges, None);
+                let geometry = Geometry::build(&model, &model.position, &[1.0; 36], edges);
                 assert!(geometry.wall.forward.entries() > 0);
                 let speed = |x: &Vec2| if rate == 0.0 { 1.0 } else { rate * distance(x) };
                 let velocity: Vec<Vec2> = model.position.iter().map(|x| along * speed(x)).collect();
@@ -224,7 +224,7 @@ pub(crate) mod tests {
     fn simple_shear_has_positive_spin() {
         let model = square_block(6);
         let edges = EdgesView::statics(&model.outline);
-        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], edges, None);
+        let geometry = Geometry::build(&model, &model.position, &[1.0; 36], edges);
         let velocity: Vec<Vec2> = model.position.iter().map(|x| Vec2::new(0.2 * x.y, 0.0)).collect();
         let rate = motion(&geometry, 30, &velocity).increment(&Deformation::default(), 1.0);
         let expected = StrainIncrement { xx: 0.0, yy: 0.0, xy: 0.2, spin: 0.1 };
@@ -252,7 +252,7 @@ pub(crate) mod tests {
                 Condition::NoSlip, Condition::NoSlip, Condition::VerticalRoller, Condition::FreeSlip,
             ][wall as usize];
             let edges = EdgesView { outline: &model.outline, walls: Walls::shaken(&model.outline, base, [false; 2]) };
-            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], edges, None);
+            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], edges);
             let velocity: Vec<Vec2> = v.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
             let points: Vec<StressPoint> = normal.iter().zip(&shear).map(|(n, s)| StressPoint {
                 stress: Stress { xx: n.0, yy: n.1, xy: s.0, zz: 0.0 },
@@ -288,7 +288,7 @@ pub(crate) mod tests {
             let period = periodic.then_some(Period { width: COLUMNS as f64 });
             let model = disordered(&disorder, period);
             let edges = EdgesView::statics(&model.outline);
-            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], edges, None);
+            let geometry = Geometry::build(&model, &model.position, &[1.0; NODES], edges);
             let points = vec![StressPoint { shear_modulus: 1e4, density: 1.0, volume: 0.5, ..StressPoint::default() }; STRESS_NODES * NODES];
             let rough: Vec<Vec2> = v.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
             let force = forces(&geometry, &points, &rough, 0.1);

@@ -4,7 +4,7 @@
 
 use crate::{
     parallel::{Rows, chunks, for_each_chunk},
-    section::description::{Model, STRESS_NODES},
+    section::{description::Model, stress_layout::StressLayout},
     skeleton::point::StressPoint,
     weights::geometry::Geometry,
 };
@@ -58,7 +58,7 @@ impl Viscosity {
     pub fn update(
         &mut self,
         threaded: bool,
-        model: &Model,
+        (model, layout): (&Model, &StressLayout),
         geometry: &Geometry,
         points: &[StressPoint],
         MovingNodes { position, velocity, volume }: MovingNodes,
@@ -68,8 +68,8 @@ impl Viscosity {
         let least = SOFTENING * h * h;
         // Impedance of the skeleton alone: water adds no viscosity.
         let impedance = |node: usize| {
-            let point = &points[STRESS_NODES * node];
-            (point.stiffness * point.density).sqrt()
+            let point = layout.of_node(node).next().map_or(0, |(point, _)| point);
+            (points[point].stiffness * points[point].density).sqrt()
         };
         let strength = 0.5 * self.coefficient * h;
         let mut unit = [vec![(); position.len()], vec![(); position.len()]];
@@ -118,12 +118,12 @@ mod tests {
             let velocity: Vec<Vec2> = velocities.into_iter().map(|(x, y)| Vec2::new(x, y)).collect();
             let volume = vec![1.0; SIDE * SIDE];
             let edges = EdgesView::statics(&model.outline);
-            let geometry = Geometry::build(&model, &model.position, &volume, edges, None);
+            let geometry = Geometry::build(&model, &model.position, &volume, edges);
             let points = vec![StressPoint { stiffness: 4.0, density: 1.0, ..StressPoint::default() }; 2 * SIDE * SIDE];
             let mut viscosity = Viscosity::new(0.1, SIDE * SIDE);
             let mut forces = |velocity: &[Vec2]| {
                 let nodes = MovingNodes { position: &model.position, velocity, volume: &volume };
-                viscosity.update(false, &model, &geometry, &points, nodes);
+                viscosity.update(false, (&model, &StressLayout::Diagonal), &geometry, &points, nodes);
                 viscosity.force.clone()
             };
             let force = forces(&velocity);

@@ -2,8 +2,9 @@
 
 use crate::{
     error::SolverError,
-    section::description::{Model, Operators},
+    section::description::{AccelerationTerm, Model, Operators},
     stages::stage::{Displacements, Stage, WaterReference},
+    weights::balance,
 };
 
 /// The choices to which the rules apply.
@@ -12,10 +13,18 @@ use crate::{
 pub struct Choices {
     /// The printed operators.
     pub printed_operators: bool,
+    /// The operators of the dual lattice.
+    pub dual_operators: bool,
     /// Inertia corrected for dispersion.
     pub dispersion_correction: bool,
     /// Pore water.
     pub water: bool,
+    /// Soil that takes up and gives off water, by a retention curve.
+    pub retention: bool,
+    /// The acceleration term of Eq. 7, asked for.
+    pub acceleration_term: bool,
+    /// A base that is not level, or not half a row below the lowest nodes.
+    pub uneven_base: bool,
     /// Periodic sides.
     pub periodic_sides: bool,
     /// A free-field side.
@@ -37,8 +46,12 @@ impl Choices {
     pub fn of_model(model: &Model) -> Self {
         Self {
             printed_operators: model.numerics.operators == Operators::Printed,
+            dual_operators: model.numerics.operators == Operators::Dual,
             dispersion_correction: model.numerics.dispersion_correction,
             water: model.water.is_some(),
+            retention: model.regions.iter().any(|region| region.retention.is_some()),
+            acceleration_term: model.numerics.acceleration_term == AccelerationTerm::On,
+            uneven_base: !balance::is_even(model),
             periodic_sides: model.period.is_some(),
             ..Self::default()
         }
@@ -75,7 +88,7 @@ pub struct Rule {
 }
 
 /// All rules, in the order in which they are checked.
-pub const RULES: [Rule; 10] = [
+pub const RULES: [Rule; 12] = [
     Rule {
         name: "dispersion correction with printed operators",
         choice: "dispersion_correction",
@@ -136,6 +149,18 @@ pub const RULES: [Rule; 10] = [
         expected: "conservative in saturated ground beside free-field sides",
         breaks: |c| c.printed_operators && c.water && c.free_field,
     },
+    Rule {
+        name: "dual lattice with edges that it does not have",
+        choice: "operators",
+        expected: "conservative beside free-field sides, on an uneven base, and with hydraulic conditions in motion",
+        breaks: |c| c.dual_operators && (c.free_field || c.uneven_base || c.hydraulic_conditions),
+    },
+    Rule {
+        name: "dual lattice with physics that it does not have",
+        choice: "operators",
+        expected: "conservative with dispersion correction, retention curves and the acceleration term",
+        breaks: |c| c.dual_operators && (c.dispersion_correction || c.retention || c.acceleration_term),
+    },
 ];
 
 /// Rules that the choices break, in the order of the table.
@@ -163,7 +188,7 @@ mod tests {
     /// Each rule has its own name, and no single choice breaks a rule, except still water, which needs water.
     #[test]
     fn each_rule_needs_two_choices() {
-        let set: [fn(&mut Choices); 10] = [
+        let set: [fn(&mut Choices); 14] = [
             |c| c.printed_operators = true,
             |c| c.dispersion_correction = true,
             |c| c.water = true,
@@ -174,6 +199,10 @@ mod tests {
             |c| c.large_displacements = true,
             |c| c.hydraulic_conditions = true,
             |c| c.still_water = true,
+            |c| c.dual_operators = true,
+            |c| c.retention = true,
+            |c| c.acceleration_term = true,
+            |c| c.uneven_base = true,
         ];
         let with = |chosen: &[usize]| {
             let mut choices = Choices::default();

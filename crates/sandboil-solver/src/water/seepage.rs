@@ -14,6 +14,7 @@ use crate::{
         description::{Model, STRESS_NODES, Water, positive},
         node_id::id,
         order::sorted,
+        stress_layout::check_stress,
     },
     water::{
         conditions::{Cell, Cells, Demand, HydraulicBoundary},
@@ -162,6 +163,7 @@ impl Seepage {
         boundaries: Vec<HydraulicBoundary>,
     ) -> Result<Self, SolverError> {
         model.validate()?;
+        check_stress(model)?;
         let Some(water) = model.water else {
             return Err(SolverError::Order { call: "seepage", needs: "a model with water" });
         };

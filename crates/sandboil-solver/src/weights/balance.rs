@@ -60,13 +60,21 @@ struct Stencil {
     parts: Vec<Part>,
 }
 
-/// Whether a section needs balanced weights: on a rough held base that is not level or not half a row below
-/// the lowest nodes.
-pub fn is_needed(model: &Model, EdgesView { outline, walls }: EdgesView) -> bool {
+/// Whether the base of a section is level and half a row below the lowest nodes.
+pub fn is_even(model: &Model) -> bool {
+    is_level(model, &model.outline)
+}
+
+fn is_level(model: &Model, outline: &Outline) -> bool {
     let cell = model.cell();
-    let even = outline.relief() <= EVEN * model.spacing.y
-        && model.volume.iter().all(|volume| (volume - cell).abs() <= EVEN * cell);
-    model.numerics.operators == Operators::Conservative && walls.base == Condition::NoSlip && !even
+    outline.relief() <= EVEN * model.spacing.y
+        && model.volume.iter().all(|volume| (volume - cell).abs() <= EVEN * cell)
+}
+
+/// Whether a section needs balanced weights: on a rough held base that is not even.
+pub fn is_needed(model: &Model, EdgesView { outline, walls }: EdgesView) -> bool {
+    let is_even = is_level(model, outline);
+    model.numerics.operators == Operators::Conservative && walls.base == Condition::NoSlip && !is_even
 }
 
 /// Changes of the weights that bring stress into balance, by stress node. The neighbours of the stress nodes,
@@ -308,7 +316,7 @@ mod tests {
     }
 
     fn build_geometry(model: &Model) -> Geometry {
-        Geometry::build(model, &model.position, &model.volume, EdgesView::statics(&model.outline), None)
+        Geometry::build(model, &model.position, &model.volume, EdgesView::statics(&model.outline))
     }
 
     /// Points under a stress `(xx, yy)` that depends on the position.
@@ -394,7 +402,6 @@ mod tests {
             &model.position,
             &model.volume,
             EdgesView { outline: &model.outline, walls },
-            None,
         );
         let mut velocity: Vec<Vec2> =
             (0..model.nodes()).map(|k| Vec2::new((0.7 * k as f64).sin(), (1.3 * k as f64).cos())).collect();

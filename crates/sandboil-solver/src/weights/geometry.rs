@@ -2,15 +2,15 @@
 
 use crate::{
     section::{
-        description::{Model, Operators, STRESS_NODES},
+        description::{Model, Operators},
         node_id::id,
         outline::EdgesView,
+        stress_layout::StressLayout,
     },
     weights::{
         balance,
         images::Surroundings,
         lists::{Lists, skin},
-        points::stress_node_positions,
         printed::{PrintedTables, printed_strain_tables, printed_tables},
         rows::{Paired, VectorWeight, divergence_row, least_squares_tables},
         stencils::Stencils,
@@ -46,10 +46,16 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Builds all tables at `position` for nodes of `volume` (m2). The lists of `previous` are reused if they
-    /// are still valid.
-    pub fn build(
+    /// Builds all tables at `position` for nodes of `volume` (m2), with the stress points of a section at rest.
+    pub fn build(model: &Model, position: &[Vec2], volume: &[f64], edges: EdgesView) -> Self {
+        Self::renew(model, &StressLayout::new(model), position, volume, edges, None)
+    }
+
+    /// Builds all tables for the present stress points. The lists of `previous` are reused if they are still
+    /// valid.
+    pub fn renew(
         model: &Model,
+        layout: &StressLayout,
         position: &[Vec2],
         volume: &[f64],
         edges: EdgesView,
@@ -59,14 +65,16 @@ impl Geometry {
         // Lists are reused after nodes have moved, so images are made for more nodes than the kernel reaches.
         let around =
             Surroundings::new(position, edges.outline, edges.walls, kernel.support() + 2.0 * skin(model));
-        let stress_position = stress_node_positions(position, model.spacing);
+        let stress_position = layout.positions(position, model.spacing);
         let list = previous
             .map(|geometry| geometry.list)
             .filter(|list| list.are_valid(model, &around, position))
             .unwrap_or_else(|| Lists::build(model, &around, kernel.support(), position, &stress_position));
         let stencils = Stencils { around: &around, volume, kernel, period: model.period };
         let (gradient, covariance, wall_table) = match model.numerics.operators {
-            Operators::Conservative => least_squares_tables(&stencils, &list.from_stress, &stress_position),
+            Operators::Conservative | Operators::Dual => {
+                least_squares_tables(&stencils, &list.from_stress, &stress_position)
+            }
             Operators::Printed => printed_strain_tables(&stencils, &list.from_stress, &stress_position),
         };
         let is_balanced = balance::is_needed(model, edges);
@@ -82,7 +90,8 @@ impl Geometry {
         } else {
             wall_table
         };
-        let flow = model.water.is_some().then(|| flow_tables(&stencils, &list.from_velocity, position));
+        let has_flow = model.water.is_some() && model.numerics.operators != Operators::Dual;
+        let flow = has_flow.then(|| flow_tables(&stencils, &list.from_velocity, position));
         let printed = (model.numerics.operators == Operators::Printed)
             .then(|| printed_tables(&stencils, &list, position, &stress_position, edges));
         let nodes = position.len();
@@ -122,13 +131,14 @@ impl Geometry {
 
     /// Upper bounds of the largest squared wave numbers of strain and divergence, 1/m2 (Gershgorin): how
     /// sharp the weights are. `volume` holds the volumes of the nodes, m2.
-    pub fn sharpness(&self, volume: &[f64]) -> [f64; 2] {
-        let half = |s: usize| volume[s / STRESS_NODES] / STRESS_NODES as f64;
+    pub fn sharpness(&self, layout: &StressLayout, volume: &[f64]) -> [f64; 2] {
+        let of_point = |s: usize| layout.volume(s, volume);
         let strain = |s: usize| -> f64 {
             let free = self.gradient.forward.iter_row(s).map(|(_, weight)| weight.gradient.norm());
             free.sum::<f64>() + self.wall.forward.iter_row(s).map(|(_, w)| w.magnitude()).sum::<f64>()
         };
-        let of_points: Vec<f64> = (0..self.gradient.forward.rows()).map(|s| half(s) * strain(s)).collect();
+        let of_points: Vec<f64> =
+            (0..self.gradient.forward.rows()).map(|s| of_point(s) * strain(s)).collect();
         let of_node = |j: usize| -> f64 {
             let free = self.gradient.transposed.iter_row(j).map(|(s, w)| w.gradient.norm() * of_points[s]);
             let walls = self.wall.transposed.iter_row(j).map(|(s, w)| w.magnitude() * of_points[s]);

@@ -2,6 +2,7 @@
 //! tables.
 
 pub mod balance;
+pub mod corners;
 pub mod free_surface;
 pub mod geometry;
 pub mod images;

@@ -3,7 +3,7 @@
 use sandboil_soil::{Integrator, Soil, elastic::Elastic};
 use sandboil_solver::{
     AccelerationTerm, Base, Conductivity, Diffusion, MOVING_FACTOR, Model, Numerics, Operators, Outline,
-    Output, Region, Shaking, UpgoingWave, Water, stress_node_offset,
+    Output, Region, Shaking, UpgoingWave, Water, stress_node_offset, stress_positions,
 };
 use sandboil_sph::{Period, Vec2};
 
@@ -54,6 +54,21 @@ pub fn column(height: f64, spacing: f64, columns: usize, region: Region, water: 
         outline: Outline::level(0.0),
         numerics: numerics(),
     }
+}
+
+/// The same column, or another section of one soil under level ground, on the dual lattice with its default numerics.
+pub fn dual(mut model: Model) -> Model {
+    let Region { porosity, solid_density, .. } = model.regions[0];
+    // Under water the soil weighs its buoyant weight.
+    let density = model.water.map_or(0.0, |water| water.unit_weight / model.gravity);
+    let weight = (1.0 - porosity) * (solid_density - density) * model.gravity;
+    model.numerics.operators = Operators::Dual;
+    model.numerics.smoothing_ratio = 1.2;
+    model.numerics.velocity_filter = 0.5;
+    let surface = model.surface_elevation[0];
+    model.vertical_effective_stress =
+        stress_positions(&model).iter().map(|at| weight * (surface - at.y)).collect();
+    model
 }
 
 /// Linear elastic soil of mixture density 2 Mg/m3 when dry.

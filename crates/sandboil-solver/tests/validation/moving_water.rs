@@ -280,7 +280,7 @@ fn ground_that_can_move_drains_as_ground_at_rest() {
         // The lowest rows, still saturated, no longer carry the weight of the water that has drained above:
         // total stress by Bishop, tension positive. Single rows alternate about it by some per cent.
         let relief = |i: usize| {
-            let stress = simulation.stress()[i];
+            let stress = &simulation.stress()[i];
             let at_rest = &model.vertical_effective_stress[2 * i..2 * i + 2];
             let effective = 0.5 * (stress[0][1] + stress[1][1] + at_rest[0] + at_rest[1]);
             let then = model.saturation[i] * model.pore_pressure[i];

@@ -33,8 +33,12 @@ def choices(scene: Scene, stage: AnyStage) -> _core.Choices:
     is_run_out = isinstance(stage, RunOut)
     return _core.Choices(
         printed_operators=scene.numerics.operators == "printed",
+        dual_operators=scene.numerics.operators == "dual",
         dispersion_correction=scene.numerics.dispersion_correction,
         water=scene.water is not None,
+        retention=any(region.retention is not None for region in scene.regions),
+        acceleration_term=scene.numerics.acceleration_term == "on",
+        uneven_base=not scene.outline.base_is_level,
         periodic_sides=scene.is_periodic,
         free_field="free-field" in scene.side_kinds and not is_run_out,
         open_sides=isinstance(stage, RunOut) and bool(stage.open_sides),

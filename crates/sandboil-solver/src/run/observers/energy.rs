@@ -128,23 +128,24 @@ impl Energy {
         self.renewal += gained;
     }
 
-    /// Adds the work of stress in a step's strain, kJ/m.
-    pub fn strain(&mut self, work: StressWork) {
-        self.stress += work.mean;
+    /// Adds the work of stress, and of the pore pressure at the corners of cells, in a step's strain, kJ/m.
+    pub fn strain(&mut self, stress: StressWork, water: StressWork) {
+        self.stress += stress.mean;
+        self.water += water.mean;
     }
 
     /// The columns of [`ENERGY_NAMES`] without the masses, from the kinetic energy and the work `after` of
-    /// the last stress in the last strain increment, kJ/m. The energy taken by velocity filter and Rayleigh
+    /// the last stress and pressure in the last strain increment, kJ/m. The energy taken by velocity filter and Rayleigh
     /// damping is the remainder.
-    fn columns(&self, kinetic: f64, after: f64) -> [f64; 13] {
+    fn columns(&self, kinetic: f64, after: [f64; 2]) -> [f64; 13] {
         // Half of the last increment, with the stress after it, belongs to the next step's force.
-        let stress = self.stress - 0.5 * after;
+        let [stress, water] = [self.stress - 0.5 * after[0], self.water - 0.5 * after[1]];
         let supplied = self.constant.total + self.base + self.sides + self.renewal;
-        let stored = (kinetic - self.kinetic_before) + self.water + self.local_damping;
+        let stored = (kinetic - self.kinetic_before) + water + self.local_damping;
         [
             kinetic,
             stress,
-            self.water,
+            water,
             supplied - stored - stress,
             self.local_damping,
             self.constant.weight,
@@ -179,9 +180,9 @@ impl EnergyHistory {
         time >= self.next as f64 * self.interval
     }
 
-    /// Takes a sample at the end of a step, `time` in s, from the kinetic energy and the work of the stress
-    /// `after` the step in the strain of the step, kJ/m.
-    pub fn push(&mut self, time: f64, energy: &Energy, kinetic: f64, after: f64, phases: &Phases) {
+    /// Takes a sample at the end of a step, `time` in s, from the kinetic energy and the work of stress and
+    /// pressure `after` the step in the strain of the step, kJ/m.
+    pub fn push(&mut self, time: f64, energy: &Energy, kinetic: f64, after: [f64; 2], phases: &Phases) {
         while self.is_due(time) {
             self.next += 1;
         }

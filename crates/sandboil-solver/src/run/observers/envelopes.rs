@@ -23,9 +23,9 @@ impl Envelopes {
 
     /// Updates the envelopes with the present values.
     pub fn record(&mut self, ground: &Ground) {
-        if let (Some(envelope), Some(flow)) = (&mut self.pressure, &ground.water) {
+        if let (Some(envelope), Some(water)) = (&mut self.pressure, &ground.water) {
             for (node, largest) in envelope.iter_mut().enumerate() {
-                *largest = largest.max(flow.excess(node));
+                *largest = largest.max(water.excess(node));
             }
         }
         if let Some(envelope) = &mut self.strain {

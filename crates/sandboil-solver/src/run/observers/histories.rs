@@ -5,7 +5,7 @@ use crate::{
     run::{clock::Clock, ground::Ground},
     skeleton::point::StressPoint,
     stages::stage::Output,
-    weights::points::{point_weights, stress_node_positions},
+    weights::points::point_weights,
 };
 use sandboil_sph::{Csr, Vec2};
 use std::{collections::VecDeque, f64::consts::PI};
@@ -42,10 +42,10 @@ pub struct Histories {
 impl Histories {
     /// Histories at the probes of a stage that begins with a time step, s.
     pub fn new(ground: &Ground, output: &Output, dt: f64) -> Self {
-        let Ground { model, position, .. } = ground;
+        let Ground { model, layout, position, .. } = ground;
         let of_stress = output
             .stress_histories
-            .then(|| point_weights(model, &stress_node_positions(position, model.spacing), &output.probes));
+            .then(|| point_weights(model, &layout.positions(position, model.spacing), &output.probes));
         let channels = output.probes.len() * channel_names(ground.water.is_some(), of_stress.is_some()).len();
         Self {
             of_nodes: point_weights(model, position, &output.probes),
@@ -76,7 +76,7 @@ impl Histories {
                 a += acceleration[j] * weight;
                 v += (velocity[j] - acceleration[j] * (0.5 * clock.dt)) * weight;
                 u += (position[j] - model.position[j]) * weight;
-                excess += water.as_ref().map_or(0.0, |flow| flow.excess(j)) * weight;
+                excess += water.as_ref().map_or(0.0, |water| water.excess(j)) * weight;
             }
             for vector in [a, v, u] {
                 put(vector.x);

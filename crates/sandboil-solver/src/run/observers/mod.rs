@@ -51,14 +51,14 @@ impl Observers {
         self.histories.record(ground, clock);
     }
 
-    /// Adds the work of stress in the step's strain.
-    pub fn account_strain(&mut self, work: StressWork) {
-        self.energy.strain(work);
+    /// Adds the work of stress in the step's strain, and of the pore pressure at the corners of cells.
+    pub fn account_strain(&mut self, stress: StressWork, water: StressWork) {
+        self.energy.strain(stress, water);
     }
 
-    /// At the end of a step: takes a sample of energy if one `is_due`, and completes the histories if the
+    /// At the end of a step, with the work of stress and water `after` it in its strain: takes a sample of energy if one `is_due`, and completes the histories if the
     /// stage `is_over`.
-    pub fn end_step(&mut self, domain: &Domain, after: f64, is_due: bool, is_over: bool) {
+    pub fn end_step(&mut self, domain: &Domain, after: [f64; 2], is_due: bool, is_over: bool) {
         let Domain { ground, clock, .. } = domain;
         if is_due {
             let mut energy = self.energy;

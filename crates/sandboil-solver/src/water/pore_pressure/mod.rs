@@ -104,7 +104,7 @@ struct Still {
 }
 
 /// What the caller chose for a stage.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum FlowScheme {
     /// No diffusion.
     Undrained,
@@ -114,6 +114,28 @@ pub enum FlowScheme {
     ExplicitWithAcceleration,
     /// Backward Euler.
     Implicit,
+}
+
+impl FlowScheme {
+    /// Whether pore water flows.
+    pub fn is_drained(self) -> bool {
+        self != Self::Undrained
+    }
+
+    /// Whether the acceleration term of Eq. 7 is part of the flow.
+    pub fn has_acceleration_term(self) -> bool {
+        self == Self::ExplicitWithAcceleration
+    }
+
+    /// Name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Undrained => "undrained",
+            Self::Explicit => "explicit",
+            Self::ExplicitWithAcceleration => "explicit with acceleration term",
+            Self::Implicit => "implicit",
+        }
+    }
 }
 
 /// Motion of the skeleton at the middle of a step, at every node.
@@ -354,23 +376,13 @@ impl Flow {
         self.wetting.as_ref().map(|wetting| |node| wetting.saturation(node))
     }
 
-    /// Whether pore water flows between nodes.
-    pub fn is_drained(&self) -> bool {
-        self.diffusion.is_some()
-    }
-
-    /// Whether the acceleration term of Eq. 7 is part of the flow.
-    pub fn has_acceleration_term(&self) -> bool {
-        matches!(self.scheme, Scheme::Explicit { acceleration_term: true })
-    }
-
-    /// Name of the scheme.
-    pub fn scheme_name(&self) -> &'static str {
+    /// How the excess is advanced.
+    pub fn scheme(&self) -> FlowScheme {
         match self.scheme {
-            Scheme::Undrained => "undrained",
-            Scheme::Explicit { acceleration_term: false } => "explicit",
-            Scheme::Explicit { acceleration_term: true } => "explicit with acceleration term",
-            Scheme::Implicit { .. } => "implicit",
+            Scheme::Undrained => FlowScheme::Undrained,
+            Scheme::Explicit { acceleration_term: false } => FlowScheme::Explicit,
+            Scheme::Explicit { acceleration_term: true } => FlowScheme::ExplicitWithAcceleration,
+            Scheme::Implicit { .. } => FlowScheme::Implicit,
         }
     }
 

@@ -5,6 +5,7 @@ use crate::{
         description::{Conductivity, Water},
         edge_nodes::EdgeNodes,
         outline::{Condition, EdgesView, Outline, Side, Support, Walls},
+        stress_layout::StressLayout,
     },
     testing::square_block,
     water::{
@@ -26,6 +27,8 @@ fn drawn<'a>(model: &'a Model, phases: &'a Phases, geometry: &'a Geometry, walls
         edges: NO_EDGES,
         position: &model.position,
         phases,
+        layout: &StressLayout::Diagonal,
+        points: &[],
         mass: &[],
         geometry,
         free_surface: None,
@@ -36,7 +39,7 @@ fn flow_of(model: &Model, scheme: FlowScheme, conditions: &[MovingBoundary]) -> 
     let phases = Phases::new(model);
     let walls = Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]);
     let edges = EdgesView { outline: &model.outline, walls };
-    let geometry = Geometry::build(model, &model.position, &model.volume, edges, None);
+    let geometry = Geometry::build(model, &model.position, &model.volume, edges);
     let section = drawn(model, &phases, &geometry, walls);
     let flow = Flow::new(section, scheme, conditions).unwrap().unwrap();
     (flow, geometry)
@@ -84,7 +87,7 @@ fn water_stiffens_as_pores_close() {
     let (mut flow, geometry) = flow_of(&model, FlowScheme::Undrained, &[]);
     assert_eq!(flow.stiffness[4], 8.0 / 0.5);
     let strained = StressPoint { strain: [0.0, -0.1, 0.0], ..StressPoint::default() };
-    phases.update_volumes(&vec![strained; STRESS_NODES * model.nodes()]);
+    phases.update_volumes(&StressLayout::Diagonal, &vec![strained; STRESS_NODES * model.nodes()]);
     let walls = Walls::shaken(&model.outline, Condition::VerticalRoller, [false; 2]);
     flow.follow(drawn(&model, &phases, &geometry, walls), 0.0);
     let porosity = 1.0 - 0.5 * 0.1_f64.exp();

@@ -1,0 +1,239 @@
+//! Stress points on the dual lattice: at the corners of the nodes' cells, exactly on surface, base and sides.
+//!
+//! A corner where cells of several soils meet has one point for each soil, with the part of the volume that the cells of
+//! that soil have. All points of a corner have the same strain and the same pore pressure: they are at one place.
+
+use crate::section::{description::Model, node_id::id, outline::Hand};
+use sandboil_sph::Vec2;
+use std::collections::BTreeMap;
+
+/// Corners of a cell.
+pub const CORNERS: usize = 4;
+/// Distance from an edge, over the spacing, up to which a corner lies on it: far above rounding.
+const ON_EDGE: f64 = 1e-6;
+/// Least volume of a full corner, over that of a cell. The corner at the foot of a step, with three quarters, has as many
+/// neighbours inside as one in full ground.
+const FULL: f64 = 0.7;
+/// Distance in spacings within which a corner joins a full one.
+const REACH: i64 = 2;
+
+/// Stress points at the corners of cells.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+pub struct DualLattice {
+    /// Present positions, m; updated when the geometry is renewed.
+    pub position: Vec<Vec2>,
+    /// Positions of the nodes when those of the points were last updated, m.
+    pub nodes_at: Vec<Vec2>,
+    /// The edges on which each point lies.
+    pub on: Vec<OnEdges>,
+    /// Volume at rest, m2: a quarter of each cell of the point's soil that touches it.
+    pub volume: Vec<f64>,
+    /// A node of the point's soil whose cell touches it.
+    pub node: Vec<u32>,
+    /// The four points of the node's soil at the corners of each cell, counter-clockwise from the lower left.
+    pub of_node: Vec<[u32; CORNERS]>,
+    /// Place of each point.
+    pub place: Vec<u32>,
+    /// The first point at each place.
+    pub first: Vec<u32>,
+    /// Whether each place lies on a free surface.
+    pub is_free: Vec<bool>,
+    /// Groups of points that share one volume strain; the points of no group are not listed.
+    pub groups: Vec<Vec<u32>>,
+    /// Group of each point.
+    pub group: Vec<Option<u32>>,
+}
+
+/// Edges on which a point lies at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+pub struct OnEdges {
+    /// The base.
+    pub base: bool,
+    /// One of the sides.
+    pub side: Option<Hand>,
+}
+
+impl OnEdges {
+    fn at(model: &Model, at: Vec2) -> Self {
+        let Model { outline, spacing, .. } = model;
+        let foot = outline.nearest_on_base(at);
+        let is_on_side = |hand: Hand| {
+            outline.sides[hand as usize].is_some_and(|side| (at.x - side.x).abs() < ON_EDGE * spacing.x)
+        };
+        Self {
+            base: foot.is_some_and(|(foot, _)| (foot - at).norm() < ON_EDGE * model.mean_spacing()),
+            side: Hand::BOTH.into_iter().find(|&hand| is_on_side(hand)),
+        }
+    }
+
+    /// Parts into which the edges cut the surroundings of the point.
+    fn parts(self) -> f64 {
+        let halved = |is_cut: bool| if is_cut { 2.0 } else { 1.0 };
+        halved(self.base) * halved(self.side.is_some())
+    }
+}
+
+/// Row and column of a corner on the lattice: that of the cell to its upper right.
+type Corner = (i64, i64);
+
+/// Rows and columns of the lattice.
+struct Lattice {
+    first: Vec2,
+    spacing: Vec2,
+    /// Number of columns between periodic sides.
+    columns: Option<i64>,
+}
+
+impl Lattice {
+    fn new(model: &Model) -> Self {
+        let first = model.position.iter().fold(Vec2::repeat(f64::INFINITY), |low, x| low.inf(x));
+        let columns = model.period.map(|period| whole(period.width / model.spacing.x));
+        Self { first, spacing: model.spacing, columns }
+    }
+
+    /// Row and column of a node's cell.
+    fn cell(&self, at: Vec2) -> Corner {
+        let place = (at - self.first).component_div(&self.spacing);
+        (whole(place.y), whole(place.x))
+    }
+
+    fn wrapped(&self, (row, column): Corner) -> Corner {
+        (row, self.columns.map_or(column, |columns| column.rem_euclid(columns)))
+    }
+
+    /// Corners of a cell, counter-clockwise from the lower left.
+    fn corners(&self, (row, column): Corner) -> [Corner; CORNERS] {
+        [(row, column), (row, column + 1), (row + 1, column + 1), (row + 1, column)]
+            .map(|corner| self.wrapped(corner))
+    }
+
+    fn position(&self, (row, column): Corner) -> Vec2 {
+        self.first + Vec2::new(column as f64 - 0.5, row as f64 - 0.5).component_mul(&self.spacing)
+    }
+}
+
+fn whole(value: f64) -> i64 {
+    #[allow(clippy::cast_possible_truncation)] // far fewer cells than 2^63
+    let count = value.round() as i64;
+    count
+}
+
+impl DualLattice {
+    /// The points of a section at rest, sorted by region, row and column.
+    pub fn new(model: &Model) -> Self {
+        let lattice = Lattice::new(model);
+        // Volume and first node of each point.
+        let mut points: BTreeMap<(u32, Corner), (f64, u32)> = BTreeMap::new();
+        let mut corners: BTreeMap<Corner, f64> = BTreeMap::new();
+        for (node, (&at, &volume)) in model.position.iter().zip(&model.volume).enumerate() {
+            for corner in lattice.corners(lattice.cell(at)) {
+                let quarter = volume / CORNERS as f64;
+                points.entry((model.region[node], corner)).or_insert((0.0, id(node))).0 += quarter;
+                *corners.entry(corner).or_default() += quarter;
+            }
+        }
+        let index: BTreeMap<_, _> = points.keys().enumerate().map(|(point, key)| (*key, id(point))).collect();
+        let place_of: BTreeMap<_, _> =
+            corners.keys().enumerate().map(|(place, corner)| (*corner, id(place))).collect();
+        let place: Vec<u32> = points.keys().map(|(_, corner)| place_of[corner]).collect();
+        let mut first = vec![u32::MAX; corners.len()];
+        for (point, place) in place.iter().enumerate() {
+            let first = &mut first[*place as usize];
+            *first = (*first).min(id(point));
+        }
+        let of_node = (0..model.nodes()).map(|node| {
+            let corners = lattice.corners(lattice.cell(model.position[node]));
+            corners.map(|corner| index[&(model.region[node], corner)])
+        });
+        let on = |corner: &Corner| OnEdges::at(model, lattice.position(*corner));
+        // With the images beyond base and sides.
+        let whole: BTreeMap<Corner, f64> =
+            corners.iter().map(|(corner, volume)| (*corner, on(corner).parts() * volume)).collect();
+        let mut dual = Self {
+            position: points.keys().map(|(_, corner)| lattice.position(*corner)).collect(),
+            nodes_at: model.position.clone(),
+            on: points.keys().map(|(_, corner)| on(corner)).collect(),
+            volume: points.values().map(|(volume, _)| *volume).collect(),
+            node: points.values().map(|(_, node)| *node).collect(),
+            of_node: of_node.collect(),
+            place,
+            first,
+            is_free: whole.values().map(|volume| *volume < model.cell() * (1.0 - ON_EDGE)).collect(),
+            groups: Vec::new(),
+            group: vec![None; points.len()],
+        };
+        dual.form_groups(model, &lattice, &whole, &place_of);
+        dual
+    }
+
+    /// Joins every corner that is not full to the nearest full one: a row of corners at a free surface has as many volume
+    /// constraints as one inside, and half of the freedoms.
+    fn form_groups(
+        &mut self,
+        model: &Model,
+        lattice: &Lattice,
+        whole: &BTreeMap<Corner, f64>,
+        place_of: &BTreeMap<Corner, u32>,
+    ) {
+        let is_full = |corner: &Corner| whole.get(corner).is_some_and(|v| *v >= FULL * model.cell());
+        let mut members: BTreeMap<Corner, Vec<Corner>> = BTreeMap::new();
+        for corner in whole.keys().filter(|corner| !is_full(corner)) {
+            let near = (-REACH..=REACH).flat_map(|up| (-REACH..=REACH).map(move |right| (up, right)));
+            let nearest = near
+                .map(|(up, right)| {
+                    let offset = Vec2::new(right as f64, up as f64).component_mul(&model.spacing);
+                    (offset.norm_squared(), lattice.wrapped((corner.0 + up, corner.1 + right)))
+                })
+                .filter(|(_, other)| is_full(other))
+                .min_by(|(a, first), (b, second)| a.total_cmp(b).then(first.cmp(second)));
+            if let Some((_, full)) = nearest {
+                members.entry(full).or_default().push(*corner);
+            }
+        }
+        let mut at_place: Vec<Vec<u32>> = vec![Vec::new(); self.first.len()];
+        for (point, place) in self.place.iter().enumerate() {
+            at_place[*place as usize].push(id(point));
+        }
+        for (full, joined) in members {
+            let places = std::iter::once(full).chain(joined).map(|corner| place_of[&corner] as usize);
+            let group: Vec<u32> = places.flat_map(|place| at_place[place].iter().copied()).collect();
+            for point in &group {
+                self.group[*point as usize] = Some(id(self.groups.len()));
+            }
+            self.groups.push(group);
+        }
+    }
+
+    /// Number of places.
+    pub fn places(&self) -> usize {
+        self.first.len()
+    }
+
+    /// Sums a value of the points over each place.
+    pub fn at_places(&self, value: impl Fn(usize) -> f64) -> Vec<f64> {
+        let mut sums = vec![0.0; self.places()];
+        for (point, place) in self.place.iter().enumerate() {
+            sums[*place as usize] += value(point);
+        }
+        sums
+    }
+
+    /// Present positions of the places, m.
+    pub fn place_positions(&self) -> Vec<Vec2> {
+        self.first.iter().map(|&point| self.position[point as usize]).collect()
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.position.as_slice())
+            + size_of_val(self.nodes_at.as_slice())
+            + size_of_val(self.on.as_slice())
+            + size_of_val(self.volume.as_slice())
+            + size_of_val(self.node.as_slice())
+            + size_of_val(self.of_node.as_slice())
+            + size_of_val(self.place.as_slice())
+            + size_of_val(self.first.as_slice())
+            + size_of_val(self.group.as_slice())
+            + self.is_free.len()
+    }
+}

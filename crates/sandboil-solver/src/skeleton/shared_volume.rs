@@ -1,0 +1,109 @@
+//! Groups of stress points at a free surface that share one volume strain.
+//!
+//! A corner at a free surface strains by the motion of as few nodes as its neighbour inside. Two volume constraints for the
+//! freedoms of one would lock nearly incompressible ground. The points of a group therefore have the mean volume strain of
+//! the group, weighted with their volumes, and carry its mean stress: the transpose.
+
+use crate::{
+    parallel::{Rows, chunks, for_each_chunk},
+    section::dual_lattice::DualLattice,
+    skeleton::{
+        deformation::Deformation,
+        point::StressPoint,
+        strain_and_force::{NodalShare, motion},
+    },
+    weights::geometry::Geometry,
+};
+use sandboil_soil::StrainIncrement;
+use sandboil_sph::Vec2;
+
+/// Volume strains of the groups in a step.
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
+pub struct SharedStrain {
+    /// Group of each point.
+    group: Vec<Option<u32>>,
+    /// Volume strain of each group in the step.
+    strain: Vec<f64>,
+}
+
+impl SharedStrain {
+    /// No strain yet.
+    pub fn new(dual: &DualLattice) -> Self {
+        Self { group: dual.group.clone(), strain: vec![0.0; dual.groups.len()] }
+    }
+
+    /// Computes the volume strain of every group from the motion over a step of `dt` (s): `theta_g = sum V J tr L / sum V J`.
+    pub fn gather(
+        &mut self,
+        dual: &DualLattice,
+        geometry: &Geometry,
+        points: &[StressPoint],
+        velocity: &[Vec2],
+        dt: f64,
+    ) {
+        for (strain, group) in self.strain.iter_mut().zip(&dual.groups) {
+            *strain = mean(group, points, |s| {
+                let mut deformation: Deformation = points[s].deformation;
+                let increment = motion(geometry, s, velocity).advance(&mut deformation, dt);
+                increment.xx + increment.yy
+            });
+        }
+    }
+
+    /// The strain of a point with the volume strain of its group.
+    #[inline]
+    pub fn applied(&self, point: usize, increment: StrainIncrement) -> StrainIncrement {
+        let Some(group) = self.group[point] else { return increment };
+        let missing = 0.5 * (self.strain[group as usize] - (increment.xx + increment.yy));
+        StrainIncrement { xx: increment.xx + missing, yy: increment.yy + missing, ..increment }
+    }
+
+    /// Sets what the forces take beside the effective stress: the `pressure` (kPa) of the pore water at each point, and the
+    /// difference of the group's mean stress from the point's own. Corrects the shares in the nodal forces.
+    pub fn carry(
+        &self,
+        threaded: bool,
+        dual: &DualLattice,
+        points: &mut [StressPoint],
+        shares: &mut [NodalShare],
+        pressure: impl Fn(usize) -> f64 + Sync,
+    ) {
+        let of_group = |group: &Vec<u32>| mean(group, points, |s| pressure(s) - mean_stress(&points[s]));
+        let carried: Vec<f64> = dual.groups.iter().map(of_group).collect();
+        let mut unit = (vec![(); points.len()], vec![(); chunks(points.len())]);
+        let rows = Rows { a: points, b: shares, c: &mut unit.0 };
+        for_each_chunk(threaded, rows, &mut unit.1, |first, rows, ()| {
+            for (k, (point, share)) in rows.a.iter_mut().zip(rows.b.iter_mut()).enumerate() {
+                let neutral = match self.group[first + k] {
+                    Some(group) => mean_stress(point) + carried[group as usize],
+                    None => pressure(first + k),
+                };
+                let change = point.volume * (point.neutral - neutral);
+                share.add(&point.deformation.cofactor().scaled(change));
+                point.neutral = neutral;
+            }
+        });
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.group.as_slice()) + size_of_val(self.strain.as_slice())
+    }
+}
+
+/// Mean of a value over the points of a group, weighted with their present volumes.
+fn mean(group: &[u32], points: &[StressPoint], value: impl Fn(usize) -> f64) -> f64 {
+    let (mut sum, mut total) = (0.0, 0.0);
+    for &s in group {
+        let point = &points[s as usize];
+        let volume = point.volume * point.deformation.volume_ratio();
+        sum += volume * value(s as usize);
+        total += volume;
+    }
+    sum / total
+}
+
+/// Mean of the in-plane effective stresses of a point, kPa, tension positive.
+fn mean_stress(point: &StressPoint) -> f64 {
+    0.5 * (point.stress.xx + point.stress.yy)
+}
