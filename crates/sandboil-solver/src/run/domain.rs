@@ -20,7 +20,7 @@ use crate::{
         local_damping::local_damping,
         printed::PrintedStress,
         rayleigh::{Rayleigh, RayleighDamping},
-        shared_volume::SharedStrain,
+        shared_volume::{SharedStrain, carry_dry},
         soils::{StrainStep, StressRows, StressWork},
         strain_and_force::{NodalShare, motion},
         viscosity::{MovingNodes, Viscosity},
@@ -435,8 +435,10 @@ impl Domain {
         if let Some(rayleigh) = &mut self.damping.rayleigh {
             rayleigh.add_stress(self.threaded, geometry, velocity, points, &mut self.workspace.shares);
         }
-        if !matches!(self.ground.water, Some(PoreWater::Corners(_))) {
-            self.carry_neutral_stress();
+        let Ground { layout, points, water, .. } = &mut self.ground;
+        // With water, its pressure at the end of the step is not known yet.
+        if let (None, Some(dual)) = (water, layout.dual()) {
+            carry_dry(dual, points, &mut self.workspace.shares);
         }
         self.counters.soil.merge(&report);
         self.counters.plastic_updates += self.ground.soil.plastic_points() as u64;
@@ -448,7 +450,7 @@ impl Domain {
     ///
     /// # Errors
     /// [`SolverError::Diverged`] if the matrix of implicit diffusion is not finite.
-    pub fn update_water(&mut self, dt: f64, with_after: bool) -> Result<StressWork, SolverError> {
+    pub fn update_water(&mut self, dt: f64) -> Result<StressWork, SolverError> {
         let Ground { water, geometry, layout, points, velocity, acceleration, .. } = &mut self.ground;
         let work = match (water, &geometry.flow, layout.dual()) {
             (Some(PoreWater::Nodes(flow)), Some(tables), _) => {
@@ -456,9 +458,7 @@ impl Domain {
                 let time = TimeStep { end: self.clock.time + dt, dt };
                 flow.step(self.threaded, tables, points, motion, time).then(StressWork::default)
             }
-            (Some(PoreWater::Corners(flow)), _, Some(dual)) => {
-                flow.step(self.threaded, dual, points, dt, with_after)
-            }
+            (Some(PoreWater::Corners(flow)), _, Some(dual)) => flow.step(self.threaded, dual, points, dt),
             _ => return Ok(StressWork::default()),
         };
         self.counters.flow_calls += 1;

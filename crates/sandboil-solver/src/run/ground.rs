@@ -230,14 +230,15 @@ impl Ground {
             *mass = phases.mass(node);
         }
         if let Some(dual) = layout.dual() {
-            update_volumes(dual, points);
-        }
-        for (s, point) in points.iter_mut().enumerate() {
-            let node = layout.node(s);
-            point.density = mass[node] / phases.volume()[node];
-            if layout.dual().is_none() {
+            update_corners(dual, points, mass, phases.volume());
+        } else {
+            for (s, point) in points.iter_mut().enumerate() {
+                let node = layout.node(s);
+                point.density = mass[node] / phases.volume()[node];
                 point.volume = layout.volume(s, phases.volume());
             }
+        }
+        for point in points {
             point.deformation = Deformation::default();
         }
         clips
@@ -333,8 +334,9 @@ impl Ground {
     }
 }
 
-/// Updates the volumes of corners from their deformation since the last geometry; those of a group grow by the same ratio.
-fn update_volumes(dual: &DualLattice, points: &mut [StressPoint]) {
+/// Updates the volumes of corners from their deformation since the last geometry, those of a group by the same ratio, and
+/// their densities from the masses (Mg/m) and volumes (m2) of the nodes around them.
+fn update_corners(dual: &DualLattice, points: &mut [StressPoint], mass: &[f64], volume: &[f64]) {
     let ratio = |group: &Vec<u32>| {
         let before: f64 = group.iter().map(|&s| points[s as usize].volume).sum();
         let now = |&s: &u32| points[s as usize].volume * points[s as usize].deformation.volume_ratio();
@@ -344,5 +346,16 @@ fn update_volumes(dual: &DualLattice, points: &mut [StressPoint]) {
     for (point, group) in points.iter_mut().zip(&dual.group) {
         let own = point.deformation.volume_ratio();
         point.volume *= group.map_or(own, |group| of_group[group as usize]);
+    }
+    let mut around = vec![[0.0; 2]; points.len()];
+    for (node, corners) in dual.of_node.iter().enumerate() {
+        for corner in corners {
+            let [masses, volumes] = &mut around[*corner as usize];
+            *masses += mass[node];
+            *volumes += volume[node];
+        }
+    }
+    for (point, [masses, volumes]) in points.iter_mut().zip(around) {
+        point.density = masses / volumes;
     }
 }

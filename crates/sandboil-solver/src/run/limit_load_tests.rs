@@ -108,7 +108,7 @@ fn footing(operators: Operators, width: usize, share: f64) -> f64 {
         }
         domain.move_nodes(dt);
         domain.update_stress(dt, false).unwrap();
-        domain.update_water(dt, false).unwrap();
+        domain.update_water(dt).unwrap();
         domain.clock.tick();
         settled += speed * dt;
     }

@@ -60,7 +60,7 @@ impl<N: Neighbour> Moving<N> {
         domain.move_nodes(dt);
         let is_due = lead == Lead::Own && self.is_sample_due(domain.clock.time + dt, dt);
         let stress_work = domain.update_stress(dt, is_due)?;
-        let water_work = domain.update_water(dt, is_due)?;
+        let water_work = domain.update_water(dt)?;
         self.observers.account_strain(stress_work, water_work);
         domain.clock.tick();
         let is_over = self.is_over(domain.clock.time, dt);

@@ -68,8 +68,7 @@ impl SharedStrain {
         shares: &mut [NodalShare],
         pressure: impl Fn(usize) -> f64 + Sync,
     ) {
-        let of_group = |group: &Vec<u32>| mean(group, points, |s| pressure(s) - mean_stress(&points[s]));
-        let carried: Vec<f64> = dual.groups.iter().map(of_group).collect();
+        let carried = carried(dual, points, &pressure);
         let mut unit = (vec![(); points.len()], vec![(); chunks(points.len())]);
         let rows = Rows { a: points, b: shares, c: &mut unit.0 };
         for_each_chunk(threaded, rows, &mut unit.1, |first, rows, ()| {
@@ -78,9 +77,7 @@ impl SharedStrain {
                     Some(group) => mean_stress(point) + carried[group as usize],
                     None => pressure(first + k),
                 };
-                let change = point.volume * (point.neutral - neutral);
-                share.add(&point.deformation.cofactor().scaled(change));
-                point.neutral = neutral;
+                take_neutral(point, share, neutral);
             }
         });
     }
@@ -89,6 +86,30 @@ impl SharedStrain {
     pub fn bytes(&self) -> usize {
         size_of_val(self.group.as_slice()) + size_of_val(self.strain.as_slice())
     }
+}
+
+/// The same as [`SharedStrain::carry`] in dry ground, where only groups carry something, after a step in which nothing else
+/// has changed it.
+pub fn carry_dry(dual: &DualLattice, points: &mut [StressPoint], shares: &mut [NodalShare]) {
+    for (group, carried) in dual.groups.iter().zip(carried(dual, points, |_| 0.0)) {
+        for &s in group {
+            let point = &mut points[s as usize];
+            take_neutral(point, &mut shares[s as usize], mean_stress(point) + carried);
+        }
+    }
+}
+
+/// What every group carries beside the mean stress of its points, kPa, compression positive.
+fn carried(dual: &DualLattice, points: &[StressPoint], pressure: impl Fn(usize) -> f64) -> Vec<f64> {
+    let of_group = |group: &Vec<u32>| mean(group, points, |s| pressure(s) - mean_stress(&points[s]));
+    dual.groups.iter().map(of_group).collect()
+}
+
+/// Changes the neutral stress of a point, and its share in the nodal forces.
+fn take_neutral(point: &mut StressPoint, share: &mut NodalShare, neutral: f64) {
+    let change = point.volume * (point.neutral - neutral);
+    share.add(&point.deformation.cofactor().scaled(change));
+    point.neutral = neutral;
 }
 
 /// Mean of a value over the points of a group, weighted with their present volumes.

@@ -4,7 +4,10 @@
 
 use crate::{
     parallel::{Rows, chunks, for_each_chunk},
-    section::{description::Model, stress_layout::StressLayout},
+    section::{
+        description::{Model, STRESS_NODES},
+        stress_layout::StressLayout,
+    },
     skeleton::point::StressPoint,
     weights::geometry::Geometry,
 };
@@ -68,8 +71,11 @@ impl Viscosity {
         let least = SOFTENING * h * h;
         // Impedance of the skeleton alone: water adds no viscosity.
         let impedance = |node: usize| {
-            let point = layout.of_node(node).next().map_or(0, |(point, _)| point);
-            (points[point].stiffness * points[point].density).sqrt()
+            let of_point = |s: usize| (points[s].stiffness * points[s].density).sqrt();
+            match layout.dual() {
+                None => of_point(STRESS_NODES * node),
+                Some(_) => layout.of_node(node).map(|(s, share)| share * of_point(s)).sum(),
+            }
         };
         let strength = 0.5 * self.coefficient * h;
         let mut unit = [vec![(); position.len()], vec![(); position.len()]];

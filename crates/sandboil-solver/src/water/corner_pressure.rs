@@ -28,6 +28,8 @@ pub struct CornerFlow {
     stiffness: Vec<f64>,
     /// Volume strain of the soil at each place at the end of the last step.
     strain: Vec<f64>,
+    /// By how much the soil at each place has pressed its water together in the step, m2.
+    pressed: Vec<f64>,
     /// Volume of each place, m2.
     volume: Vec<f64>,
     /// Whether the excess of a place stays zero: at an open surface, and beside soil that holds air.
@@ -78,6 +80,7 @@ impl CornerFlow {
             excess: vec![0.0; dual.places()],
             stiffness: vec![0.0; dual.places()],
             strain: vec![0.0; dual.places()],
+            pressed: vec![0.0; dual.places()],
             volume: Vec::new(),
             is_held,
             is_dry,
@@ -167,7 +170,6 @@ impl CornerFlow {
         dual: &DualLattice,
         points: &[StressPoint],
         dt: f64,
-        with_after: bool,
     ) -> Option<StressWork> {
         self.take_volume_strain(threaded, dual, points);
         match self.scheme {
@@ -181,19 +183,25 @@ impl CornerFlow {
                 self.diffuse_explicitly(threaded, dt);
             }
         }
-        Some(self.end_step(dual, points, with_after))
+        Some(self.end_step())
     }
 
     /// The excess that the volume strain of the step leaves: `dp = -(K_f / n) d epsilon_v`.
     fn take_volume_strain(&mut self, threaded: bool, dual: &DualLattice, points: &[StressPoint]) {
-        let (excess, strain, stiffness) = (&self.excess, &self.strain, &self.stiffness);
-        let mut unit = (vec![(); excess.len()], vec![(); excess.len()], vec![(); chunks(excess.len())]);
-        let rows = Rows { a: &mut self.next, b: &mut unit.0, c: &mut unit.1 };
-        for_each_chunk(threaded, rows, &mut unit.2, |first, rows, ()| {
-            for (k, next) in rows.a.iter_mut().enumerate() {
+        let (excess, stiffness, volume) = (&self.excess, &self.stiffness, &self.volume);
+        let mut results = vec![(); chunks(excess.len())];
+        let rows = Rows { a: &mut self.next, b: &mut self.strain, c: &mut self.pressed };
+        for_each_chunk(threaded, rows, &mut results, |first, rows, ()| {
+            for (k, (next, (strain, pressed))) in
+                rows.a.iter_mut().zip(rows.b.iter_mut().zip(rows.c.iter_mut())).enumerate()
+            {
                 let place = first + k;
-                let now = volume_strain(&points[dual.first[place] as usize]);
-                *next = excess[place] - stiffness[place] * (now - strain[place]);
+                let point = &points[dual.first[place] as usize];
+                let now = volume_strain(point);
+                let shortening = *strain - now;
+                *strain = now;
+                *next = excess[place] + stiffness[place] * shortening;
+                *pressed = shortening * volume[place] * point.deformation.volume_ratio();
             }
         });
     }
@@ -253,19 +261,13 @@ impl CornerFlow {
     }
 
     /// Takes over the new excess; returns the work of the pressure on the water in the volume strain of the step.
-    fn end_step(&mut self, dual: &DualLattice, points: &[StressPoint], with_after: bool) -> StressWork {
+    fn end_step(&mut self) -> StressWork {
         let mut work = StressWork::default();
-        for (place, &s) in dual.first.iter().enumerate() {
-            let point = &points[s as usize];
-            let now = volume_strain(point);
-            let pressed = (self.strain[place] - now) * self.volume[place] * point.deformation.volume_ratio();
-            work.mean += 0.5 * (self.excess[place] + self.next[place]) * pressed;
-            if with_after {
-                work.after += self.next[place] * pressed;
-            }
-            self.strain[place] = now;
+        for ((excess, next), pressed) in self.excess.iter_mut().zip(&self.next).zip(&self.pressed) {
+            work.mean += 0.5 * (*excess + next) * pressed;
+            work.after += next * pressed;
+            *excess = *next;
         }
-        self.excess.copy_from_slice(&self.next);
         work
     }
 
@@ -309,7 +311,7 @@ impl CornerFlow {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        5 * size_of_val(self.excess.as_slice())
+        6 * size_of_val(self.excess.as_slice())
             + 2 * self.is_held.len()
             + size_of_val(self.of_node.as_slice())
             + self.exchange.as_ref().map_or(0, Csr::bytes)
