@@ -432,7 +432,8 @@ def test_the_physics_of_water_is_told() -> None:
     assert facts["seepage"] == (True, "to its steady state")
     assert facts["partial saturation"] == (True, "soil")
     assert facts["water diffusion"] == (False, "no shaking stage")
-    assert rows(drawdown())["seepage"] == (True, "for its duration")
+    in_time = "for its duration; the skeleton stores water by its small-strain stiffness"
+    assert rows(drawdown())["seepage"] == (True, in_time)
     assert rows(bank("dry", [Gravity()]))["partial saturation"][0]
     plain = rows(scenes.column())
     assert plain["seepage"] == (False, "no seepage stage")
@@ -462,7 +463,7 @@ def test_plan_tells_what_seepage_costs() -> None:
     assert planned.file_size > 0
     changing = drawdown().plan()
     (stage,) = changing.stages
-    assert (stage.duration, stage.dt_limit) == (4.0e4, "change of saturation")
+    assert (stage.duration, stage.dt_limit) == (4.0e4, "error of a step")
     assert stage.dt > 0.0
     # No more frames than steps, at any interval: 80 nodes of three fields and places.
     assert changing.file_size < 6 * 8 * 80 * (stage.duration / stage.dt + 2)

@@ -477,11 +477,18 @@ def broken_rules(choices: Choices) -> list[str]:
 class Seepage:
     """Flow of water through a section at rest for `duration` s; None: to the steady state.
 
+    `tolerance` is the error of a step in time, of saturations and of heads over their range.
+
     Raises :class:`InvalidInput`, :class:`SandboilError`.
     """
 
     def __new__(
-        cls, section: Section, *, conditions: Sequence[Condition], duration: float | None
+        cls,
+        section: Section,
+        *,
+        conditions: Sequence[Condition],
+        duration: float | None,
+        tolerance: float,
     ) -> Seepage: ...
     def advance(self, *, steps: int, until: float, seconds: float) -> bool:
         """Step until `until` (s), `steps` are made or `seconds` have passed; returns if it is complete."""

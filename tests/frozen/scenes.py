@@ -429,7 +429,11 @@ def water_alone(folder: Path) -> sb.Scene:
         water_table=sb.WaterTable(depth=0.0),
         regions=_column(3.0, [(SILT, 0, 4, {"hydraulic_conductivity": 1e-5, "Gs": 2.65, "porosity": 0.4})]),
         sides=sb.Roller(),
-        stages=[sb.Seepage([sb.Head("left", head=4.5), sb.Head("right", head=4.0)], duration=600.0)],
+        stages=[
+            sb.Seepage(
+                [sb.Head("left", head=4.5), sb.Head("right", head=4.0)], duration=600.0, tolerance=0.001
+            )
+        ],
         output=sb.Output(field_dt=200.0),
     )
 

@@ -20,19 +20,27 @@ pub struct Seepage {
 
 #[pymethods]
 impl Seepage {
-    /// Starts from the pore pressures of the section; without a duration (s) it finds the steady state.
+    /// Starts from the pore pressures of the section; without a duration (s) it finds the steady state. `tolerance` is
+    /// the error of a step in time.
     #[new]
-    #[pyo3(signature = (section, *, conditions, duration))]
+    #[pyo3(signature = (section, *, conditions, duration, tolerance))]
     fn new(
         py: Python<'_>,
         section: &Section,
         conditions: Vec<Condition>,
         duration: Option<f64>,
+        tolerance: f64,
     ) -> PyResult<Self> {
         let model = &section.0;
         let boundaries = conditions.into_iter().map(|condition| condition.0).collect();
-        let inner =
-            py.detach(|| solver::Seepage::new(model, &model.pore_pressure, boundaries)).map_err(CoreError)?;
+        let inner = py.detach(|| {
+            let seepage = solver::Seepage::new(model, &model.pore_pressure, boundaries)?;
+            if duration.is_none() {
+                return Ok(seepage);
+            }
+            seepage.with_tolerance(tolerance)?.with_expanding_skeleton(model)
+        });
+        let inner = inner.map_err(CoreError)?;
         let until = duration.map_or(solver::Until::Steady, solver::Until::Time);
         let holds_air = model.saturation.iter().any(|share| *share < 1.0)
             || model.regions.iter().any(|region| region.retention.is_some());

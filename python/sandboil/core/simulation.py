@@ -161,7 +161,7 @@ class Simulation:
     def dt_limit(self) -> str:
         """What limits the time step."""
         if isinstance(self._present, _core.Seepage):
-            return "steady state" if self.duration is None else "change of saturation"
+            return "steady state" if self.duration is None else "error of a step"
         return self._present.time_step[1]
 
     @property
@@ -306,7 +306,9 @@ class Simulation:
         stage, description = self.present_stage, self._stages[self._index]
         if isinstance(stage, Seepage):
             conditions = [condition_description(self.scene, condition) for condition in stage.conditions]
-            self._water = _core.Seepage(self._section, conditions=conditions, duration=stage.duration)
+            self._water = _core.Seepage(
+                self._section, conditions=conditions, duration=stage.duration, tolerance=stage.tolerance
+            )
             return
         if self._grains is None:
             self._grains = _core.Simulation(self._with_water_of_seepage(), self.threads)

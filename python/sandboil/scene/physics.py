@@ -83,7 +83,9 @@ def _of_water(scene: Scene) -> list[Reasons]:
         _reasons("pore water", _water_level(scene), dry),
         _reasons(
             "seepage",
-            "to its steady state" if steady else "for its duration",
+            "to its steady state"
+            if steady
+            else "for its duration; the skeleton stores water by its small-strain stiffness",
             dry,
             (seepage is None, "no seepage stage"),
         ),

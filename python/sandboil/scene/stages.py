@@ -59,6 +59,11 @@ class Seepage(_Stage):
 
     Without a `duration` (s) the steady state, found without time. It starts from the scene's water table at
     rest, and its final pore water is that of the stages that follow.
+
+    In time, the ground stores water also by expansion of its skeleton under constant total vertical
+    stress, with the small-strain moduli of its soils under the effective stress at rest. `tolerance` is
+    the error of a time step, of degrees of saturation and of heads over their range; the error of the
+    result falls as its square root. The steady state does not use it.
     """
 
     _positional: ClassVar[tuple[str, ...]] = ("conditions",)
@@ -74,6 +79,13 @@ class Seepage(_Stage):
         description="s; none: to the steady state",
         json_schema_extra={"remedy": "86400 is a day; leave it out for the steady state"},
     )
+    tolerance: Number = Field(
+        default=0.002,
+        ge=1.0e-5,
+        le=0.05,
+        description="error of a time step, of saturation and of heads over their range",
+        json_schema_extra={"remedy": "leave it out for 0.002"},
+    )
 
     if TYPE_CHECKING:
 
@@ -82,6 +94,7 @@ class Seepage(_Stage):
             conditions: Sequence[AnyCondition],
             *,
             duration: float | None = None,
+            tolerance: float = 0.002,
         ) -> None: ...
 
 

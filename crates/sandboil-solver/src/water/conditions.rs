@@ -101,6 +101,11 @@ impl HydraulicCondition {
         self.series().map_or(0.0, |(_, series)| series.at(time))
     }
 
+    /// All values that are prescribed at some time; none where nothing is.
+    pub fn values(&self) -> &[f64] {
+        self.series().map_or(&[], |(_, series)| &series.value)
+    }
+
     /// Whether the prescribed value is constant in time.
     pub fn is_constant(&self) -> bool {
         self.series().is_none_or(|(_, series)| series.value.len() == 1)

@@ -1,5 +1,7 @@
 //! Flow of pore water through a skeleton at rest: Eq. 3 without its velocity, saturated or not.
 //!
+//! Water is stored by the air that leaves the pores, by compression of the water, and by expansion of the skeleton.
+//!
 //! In time: backward Euler in the mixed form, which keeps the water content itself, so that no water is lost however
 //! long the steps (Celia, Bouloutas and Zarba 1990, Water Resour. Res. 26). A steady state knows no storage: it is
 //! found without time, by solving for the heads and following them with the conductivities.
@@ -22,7 +24,7 @@ use crate::{
         edge_law::{EdgeLaw, Nodes, OpenEdge},
     },
 };
-use sandboil_soil::{Moisture, VanGenuchten};
+use sandboil_soil::{Moisture, Stress, VanGenuchten};
 use sandboil_sph::Vec2;
 
 /// Change of head in an iteration at which a step is solved, in spacings: Newton's next would be its square.
@@ -31,10 +33,14 @@ pub const HEAD_TOLERANCE: f64 = 1e-6;
 pub const MOST_ITERATIONS: u32 = 50;
 /// Iterations along the retention curve itself after which a step is solved by the nested ones.
 pub const DIRECT_ITERATIONS: u32 = 12;
-/// Change of the degree of saturation anywhere that a transient step aims at: conductivities lag by one step.
-pub const SATURATION_CHANGE: f64 = 0.05;
-/// Change over the aim beyond which a step is taken back.
-pub const REJECTED_CHANGE: f64 = 3.0;
+/// Error of a transient step that is aimed at unless another is given: of the degree of saturation, and of heads over the
+/// range of all heads.
+pub const TOLERANCE: f64 = 0.002;
+/// Change of the degree of saturation anywhere that a transient step aims at, over the tolerance: conductivities lag by one
+/// step.
+pub const CHANGE_FOR_ERROR: f64 = 10.0;
+/// Estimate over the aim beyond which a step is taken back.
+pub const REJECTED: f64 = 3.0;
 /// Growth of a transient step: faster growth overshoots fronts and has to go back.
 pub const GROWTH: f64 = 1.5;
 /// What is left at least of a step that changed too much, or could not be solved.
@@ -109,6 +115,8 @@ pub struct Seepage {
     porosity: Vec<f64>,
     retention: Vec<Option<VanGenuchten>>,
     conductivity: Vec<f64>,
+    /// Compliance `1/M` of the skeleton of each node in confined compression, 1/kPa; zero: rigid.
+    compliance: Vec<f64>,
     conduction: Conduction,
     boundaries: Vec<HydraulicBoundary>,
     law: EdgeLaw,
@@ -118,6 +126,12 @@ pub struct Seepage {
     moisture: Vec<Moisture>,
     /// Inflow through each cell at the end of the last step, m2/s.
     flow: Vec<f64>,
+    /// Rates of head (m/s) and saturation (1/s) in the last step.
+    rate: Vec<[f64; 2]>,
+    /// Heads at the start and those of the conditions at any time lie within such a range, m; at least a spacing.
+    head_range: f64,
+    /// Error of a step that is aimed at.
+    tolerance: f64,
     time: f64,
     dt: f64,
     following: Option<Following>,
@@ -189,10 +203,14 @@ impl Seepage {
             porosity: of_region(&|region| region.porosity),
             conductivity: of_region(&|region| region.hydraulic_conductivity.minor),
             retention: model.region.iter().map(|&region| model.regions[region as usize].retention).collect(),
+            compliance: vec![0.0; model.nodes()],
             holds: vec![false; law.cells.all.len()],
             flow: vec![0.0; law.cells.all.len()],
             head: head.collect(),
             moisture: vec![Moisture::SATURATED; model.nodes()],
+            rate: vec![[0.0; 2]; model.nodes()],
+            head_range: 0.0,
+            tolerance: TOLERANCE,
             time: 0.0,
             dt: 0.0,
             following: None,
@@ -205,10 +223,33 @@ impl Seepage {
             boundaries,
             law,
         };
+        seepage.head_range = seepage.range_of_heads().max(seepage.spacing);
         seepage.dt = seepage.first_step();
         seepage.moisture = seepage.moisture_at(&seepage.head.clone());
         seepage.begin_cells();
         Ok(seepage)
+    }
+
+    /// The same flow through a skeleton that expands with the pressure of its water under a constant total vertical
+    /// stress, by the small-strain moduli of its soils under the effective stress at rest: the stiffness with which
+    /// the same soils consolidate when they move. A steady state does not depend on it.
+    ///
+    /// # Errors
+    /// [`SolverError::Soil`] where a soil refuses the stress.
+    pub fn with_expanding_skeleton(mut self, model: &Model) -> Result<Self, SolverError> {
+        for (compliance, &node) in self.compliance.iter_mut().zip(&self.order) {
+            *compliance = confined_modulus(model, node)?.recip();
+        }
+        Ok(self)
+    }
+
+    /// The same flow in time with another error of a step that is aimed at, of saturations and of heads over their range.
+    ///
+    /// # Errors
+    /// A tolerance that is not positive.
+    pub fn with_tolerance(self, tolerance: f64) -> Result<Self, SolverError> {
+        positive("tolerance", tolerance)?;
+        Ok(Self { tolerance, ..self })
     }
 
     /// A step in which the most permeable soil moves water by a spacing.
@@ -314,19 +355,17 @@ impl Seepage {
         loop {
             let dt = self.dt.min(longest);
             let before = (self.head.clone(), self.moisture.clone(), self.holds.clone());
-            let solved = self.solve(dt, self.time + dt).then(|| {
-                let change = |(now, then): (&Moisture, &Moisture)| (now.saturation - then.saturation).abs();
-                self.moisture.iter().zip(&before.1).map(change).fold(0.0, f64::max)
-            });
-            if let Some(change) = solved.filter(|change| *change <= REJECTED_CHANGE * SATURATION_CHANGE) {
+            let solved = self.solve(dt, self.time + dt).then(|| self.excess(&before.0, &before.1, dt));
+            if let Some(excess) = solved.filter(|excess| *excess <= REJECTED) {
                 for (cell, flow) in self.law.cells.all.iter().zip(&self.flow) {
                     self.balance.inflow[cell.boundary] += flow * dt;
                 }
                 self.balance.stored +=
                     (0..self.head.len()).map(|i| self.gained(i, &before.0, &before.1)).sum::<f64>();
+                self.rate = self.rates(&before.0, &before.1, dt);
                 self.time += dt;
                 self.counters.steps += 1;
-                let next = dt * (SATURATION_CHANGE / change.max(f64::MIN_POSITIVE)).clamp(CUT, GROWTH);
+                let next = dt * excess.max(f64::MIN_POSITIVE).recip().clamp(CUT, GROWTH);
                 // A step shortened by a corner of a series does not limit the next step.
                 self.dt = if dt < self.dt { next.max(self.dt) } else { next };
                 return Ok(());
@@ -338,6 +377,46 @@ impl Seepage {
                 return Err(SolverError::Seepage { time: self.time, reason: "no step can be solved" });
             }
         }
+    }
+
+    /// Largest difference between heads at present and heads that conditions prescribe at any time, m.
+    fn range_of_heads(&self) -> f64 {
+        let prescribed = self.law.cells.all.iter().flat_map(|cell| {
+            let condition = &self.boundaries[cell.boundary].condition;
+            let demand = |&value| condition.demand(value, cell.middle.y, cell.slope, self.water.unit_weight);
+            condition.values().iter().map(move |value| demand(value).head)
+        });
+        let heads = prescribed.filter(|head| head.is_finite()).chain(self.head.iter().copied());
+        let (low, high) =
+            heads.fold((f64::MAX, f64::MIN), |(low, high), head| (low.min(head), high.max(head)));
+        high - low
+    }
+
+    /// Rates of head and saturation of a step, m/s and 1/s.
+    fn rates(&self, head: &[f64], moisture: &[Moisture], dt: f64) -> Vec<[f64; 2]> {
+        let now = self.head.iter().zip(&self.moisture);
+        let rate = |((now, wet), (then, was)): ((&f64, &Moisture), (&f64, &Moisture))| {
+            [(now - then) / dt, (wet.saturation - was.saturation) / dt]
+        };
+        now.zip(head.iter().zip(moisture)).map(rate).collect()
+    }
+
+    /// The larger of two ratios to their aims that decide the length of a step: of its error, and of the change of
+    /// saturation. The error of backward Euler is half the step times the change of the rate since the last step
+    /// (Kavetski, Binning and Sloan 2001, Adv. Water Resour. 24); that of a head counts where pores stay full.
+    fn excess(&self, head: &[f64], moisture: &[Moisture], dt: f64) -> f64 {
+        let (mut error, mut change) = (0.0_f64, 0.0_f64);
+        for (i, [rise, wetting]) in self.rates(head, moisture, dt).into_iter().enumerate() {
+            let [rose, wetted] = self.rate[i];
+            error = error.max(0.5 * dt * (wetting - wetted).abs());
+            change = change.max(dt * wetting.abs());
+            let is_full = self.moisture[i].saturation.min(moisture[i].saturation) >= 1.0;
+            if is_full {
+                error = error.max(0.5 * dt * (rise - rose).abs() / self.head_range);
+            }
+        }
+        let part = error / self.tolerance;
+        part.sqrt().max(change / (CHANGE_FOR_ERROR * self.tolerance))
     }
 
     /// Time since the start, s.
@@ -423,10 +502,13 @@ impl Seepage {
         pores * (self.moisture[i].saturation - moisture[i].saturation) + swelling
     }
 
-    /// Water that node `i` takes up by its compression per metre of head, m2 per m: `V n S_r gamma_f / K_f`.
+    /// Water that node `i` takes up per metre of head at a constant saturation, m2 per m:
+    /// `V gamma_f (S_r n / K_f + S_r^2 / M)`. The skeleton carries `S_r p` (Bishop), and the part `S_r` of the pores that
+    /// its expansion opens fills with water.
     fn compressibility(&self, i: usize, moisture: &Moisture) -> f64 {
-        self.volume[i] * self.porosity[i] * moisture.saturation * self.water.unit_weight
-            / self.water.bulk_modulus
+        let water = self.porosity[i] / self.water.bulk_modulus;
+        let skeleton = moisture.saturation * self.compliance[i];
+        self.volume[i] * moisture.saturation * self.water.unit_weight * (water + skeleton)
     }
 
     fn moisture_at(&mut self, head: &[f64]) -> Vec<Moisture> {
@@ -675,4 +757,17 @@ impl Seepage {
         self.counters.factorings += 1;
         solution
     }
+}
+
+/// Small-strain modulus of confined compression of a node's soil under its effective stress at rest, kPa.
+fn confined_modulus(model: &Model, node: usize) -> Result<f64, SolverError> {
+    let region = model.region[node] as usize;
+    let soil = &model.regions[region];
+    let points = &model.vertical_effective_stress[STRESS_NODES * node..STRESS_NODES * (node + 1)];
+    let vertical = -points.iter().sum::<f64>() / STRESS_NODES as f64;
+    let lateral = soil.earth_pressure_coefficient * vertical;
+    let stress = Stress { xx: lateral, yy: vertical, xy: 0.0, zz: lateral };
+    let moduli = soil.soil.small_strain_moduli(stress);
+    let moduli = moduli.map_err(|source| SolverError::Soil { region, node, source })?;
+    Ok(moduli.bulk + 4.0 / 3.0 * moduli.shear)
 }
