@@ -19,10 +19,12 @@ if TYPE_CHECKING:
 # peaks above it are single dilation spikes that depend on mesh and time step.
 PGA_CORNER = 10.0
 PGA_ORDER = 4
+# Name of a stage's counts in its figures.
+COUNTS = "counts"
 
 
 class Summary(dict[str, Any]):
-    """Key figures of a run by name; as text, one line for each."""
+    """Key figures of a run by name; as text, one line for each, without counts of zero."""
 
     def __str__(self) -> str:
         return "\n".join(_lines(self))
@@ -35,7 +37,8 @@ def _lines(figures: dict[str, Any], indent: str = "") -> Iterator[str]:
     for name, value in figures.items():
         if isinstance(value, dict):
             yield f"{indent}{name}"
-            yield from _lines(value, indent + "  ")
+            shown = {part: n for part, n in value.items() if n != 0} if name == COUNTS else value
+            yield from _lines(shown, indent + "  ")
         else:
             yield (
                 f"{indent}{name:{width}}  {value:.4g}"
@@ -77,7 +80,7 @@ def _stage_figures(run: Run, stage: str) -> dict[str, Any]:
         figures |= _response_figures(run, stage)
     if stage == "seepage":
         figures |= _water_figures(run)
-    figures["counts"] = {
+    figures[COUNTS] = {
         name.removeprefix(Stage.COUNT): int(count)
         for name, count in accounts.items()
         if name.startswith(Stage.COUNT)
