@@ -731,7 +731,7 @@ def dual_heap(folder: Path) -> sb.Scene:
             sb.Region(
                 "clay",
                 sb.polygon([(0, 0), (1.0, 0), (1.0, 0.4), (0.6, 0.8), (0, 0.8)]),
-                sb.TotalStress(Su=0.4, Sr=0.2, softening_strain=0.2, G=40.0, K=90.0),
+                sb.TotalStress(Su=0.4, Sr=0.2, softening_strain=0.2, G=400.0, K=900.0),
                 porosity=0.5,
                 Gs=2.7,
             )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..scene.stages import Shaking
 from .motions import StageMotions
+from .units import improbable
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
@@ -18,7 +19,7 @@ RESIDUAL_VELOCITY = 0.02
 
 def doubts(scene: Scene, loaded: list[StageMotions | None]) -> list[str]:
     """Why the answer may not be what was meant; empty if there is no reason known."""
-    found = _of_statics(scene)
+    found = improbable(scene) + _of_statics(scene)
     for (i, stage), motions in zip(scene.shakings, filter(None, loaded), strict=True):
         path = f"scene.stages[{i}]"
         found += _of_residual_velocities(motions, path)
