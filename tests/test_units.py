@@ -86,3 +86,12 @@ def test_plan_and_simulation_tell_the_doubt() -> None:
 @pytest.mark.parametrize("name", frozen_scenes.ALL)
 def test_probable_scenes_have_no_doubt(name: str, tmp_path: Any) -> None:
     assert improbable(frozen_scenes.ALL[name](tmp_path)) == []
+
+
+def test_a_plan_that_diverges_tells_the_doubt() -> None:
+    scene = ground(scenes.ROCK, dry_unit_weight=1.8e6)
+    with (
+        pytest.warns(sb.SandboilWarning, match="regions\\[0\\].dry_unit_weight"),
+        pytest.raises(sb.SimulationDiverged),
+    ):
+        scene.plan()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._errors import SandboilWarning
+from .._errors import SandboilWarning, SimulationDiverged
 from ..core.doubts import doubts
 from ..core.motions import loaded_motions
 from ..core.quantities import VECTOR_FIELDS, written_fields
@@ -205,8 +205,33 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
         # The doubts about the scene are on the page; these are about its cut motions.
         warnings.simplefilter("ignore", SandboilWarning)
         simulation = Simulation(_from_strong_part(scene), threads)
-    stages = []
     computed: dict[str, bool] = {}
+    try:
+        stages = _trials(scene, simulation, computed)
+    except SimulationDiverged:
+        # There will be no page that tells them.
+        for doubt in found:
+            warnings.warn(doubt, SandboilWarning, stacklevel=2)
+        raise
+    return Plan(
+        nodes=len(simulation.particles.position),
+        stress_nodes=simulation.stress_nodes,
+        pairs=simulation.pairs,
+        spacing=simulation.particles.spacing,
+        threads=threads,
+        accuracy=accuracy,
+        physics=computed_physics(scene, computed),
+        stages=stages,
+        arrays=simulation.arrays(),
+        file_size=_file_size(scene, simulation, stages),
+        pore_pressure_coefficients=pore_pressure_coefficients(scene),
+        doubts=found,
+    )
+
+
+def _trials(scene: Scene, simulation: Simulation, computed: dict[str, bool]) -> list[StagePlan]:
+    """A trial of every stage; adds the physics that one of them computes to `computed`."""
+    stages = []
     for index, stage in enumerate(scene.stages):
         if index > 0:
             simulation.begin_next_stage()
@@ -237,20 +262,7 @@ def plan(scene: Scene, threads: int = 2, accuracy: str = "standard") -> Plan:
                 wall_time=None if steps is None else steps * step_time,
             )
         )
-    return Plan(
-        nodes=len(simulation.particles.position),
-        stress_nodes=simulation.stress_nodes,
-        pairs=simulation.pairs,
-        spacing=simulation.particles.spacing,
-        threads=threads,
-        accuracy=accuracy,
-        physics=computed_physics(scene, computed),
-        stages=stages,
-        arrays=simulation.arrays(),
-        file_size=_file_size(scene, simulation, stages),
-        pore_pressure_coefficients=pore_pressure_coefficients(scene),
-        doubts=found,
-    )
+    return stages
 
 
 def _from_strong_part(scene: Scene) -> Scene:
