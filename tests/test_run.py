@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from sandboil import (
     Run,
     RunInterrupted,
     SandboilError,
+    SandboilWarning,
     Scene,
     Shaking,
     Simulation,
@@ -34,6 +36,7 @@ from sandboil import (
 )
 from sandboil.run import neighbourhood
 from sandboil.run.accuracy import with_accuracy
+from sandboil.run.run import warn_of_forced_sub_steps
 
 LEVEL_GROUND = Path(__file__).parents[1] / "examples" / "level_ground"
 
@@ -363,3 +366,17 @@ def test_the_example_runs(tmp_path: Path, language: str) -> None:
     assert results.status == "complete"
     assert results.times[-1] == pytest.approx(0.3, abs=1e-3)
     assert len(results.position) == 500
+
+
+def test_many_forced_sub_steps_are_told() -> None:
+    with pytest.warns(SandboilWarning, match="shaking: 2.0% of the sub-steps"):
+        warn_of_forced_sub_steps("shaking", {"forced_acceptances": 20, "substeps": 1000})
+
+
+@pytest.mark.parametrize(
+    "counters", [{"forced_acceptances": 10, "substeps": 1000}, {"forced_acceptances": 0, "substeps": 0}, {}]
+)
+def test_few_forced_sub_steps_are_not_told(counters: dict[str, int]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_forced_sub_steps("shaking", counters)

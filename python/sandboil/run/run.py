@@ -19,7 +19,14 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from .._errors import InvalidInput, ResumeWarning, RunInterrupted, SandboilError, SimulationDiverged
+from .._errors import (
+    InvalidInput,
+    ResumeWarning,
+    RunInterrupted,
+    SandboilError,
+    SandboilWarning,
+    SimulationDiverged,
+)
 from ..core.simulation import LOOK_INTERVAL, Simulation
 from ..files.committed_file import twin_of
 from ..results.layout import FILE_NAME
@@ -35,6 +42,9 @@ if TYPE_CHECKING:
 
 # Time over which the speed is measured for the time left, s: the cost of a step changes in liquefied soil.
 _SPEED_WINDOW = 30.0
+
+# Share of sub-steps with a larger error than was asked for above which a run warns.
+FORCED_SHARE = 0.01
 
 
 def run(
@@ -317,9 +327,24 @@ def _run_stage(
         raise
     writer.write(spent(), frame=is_timed or is_last)
     writer.end_stage()
+    warn_of_forced_sub_steps(simulation.stage, simulation.counters())
     for column, record in simulation.take_columns():
         save_column(writer.path.parent, column, record)
     keeper.store(writer.mark(), target, spent(), is_end=True)
+
+
+def warn_of_forced_sub_steps(stage: str, counters: dict[str, int]) -> None:
+    """Warn of a stage in which many sub-steps of the sand have a larger error than was asked for."""
+    # A seepage stage has no sand.
+    forced, made = counters.get("forced_acceptances", 0), counters.get("substeps", 0)
+    if forced > FORCED_SHARE * made:
+        warnings.warn(
+            f"{stage}: {forced / made:.1%} of the sub-steps of the sand had their least size and a larger "
+            "error than integrator_tolerance asks for; a run with numerics.integrator = 'reference' tells "
+            "whether the answer changes",
+            SandboilWarning,
+            stacklevel=3,
+        )
 
 
 class Interrupt:
