@@ -237,3 +237,57 @@ impl DualLattice {
             + self.is_free.len()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{section::outline::Outline, testing::square_block};
+
+    fn at(dual: &DualLattice, x: f64, y: f64) -> usize {
+        dual.position.iter().position(|at| (at - Vec2::new(x, y)).norm() < 1e-9).unwrap()
+    }
+
+    /// Corners take quarters of the cells around them; at a free surface they share the strain of the nearest full one.
+    #[test]
+    fn corners_share_cells_and_strain() {
+        let dual = DualLattice::new(&square_block(3));
+        assert_eq!((dual.position.len(), dual.places()), (16, 16));
+        assert!((dual.volume.iter().sum::<f64>() - 9.0).abs() < 1e-14);
+        let volumes = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5)].map(|(x, y)| dual.volume[at(&dual, x, y)]);
+        assert_eq!(volumes, [0.25, 0.5, 1.0]);
+        let group = |x: f64, y: f64| dual.group[at(&dual, x, y)];
+        assert_eq!(group(-0.5, -0.5), group(0.5, 0.5));
+        assert_eq!(group(0.5, -0.5), group(0.5, 0.5));
+        assert_ne!(group(0.5, 0.5), group(1.5, 0.5));
+        assert!(dual.groups.iter().all(|group| group.len() == 4));
+    }
+
+    /// A base continues the ground: its corners are full, and belong to no group away from the sides.
+    #[test]
+    fn corners_on_a_base_are_full() {
+        let mut model = square_block(4);
+        model.outline = Outline::level(-0.5);
+        let dual = DualLattice::new(&model);
+        let on_base = at(&dual, 1.5, -0.5);
+        assert!(dual.on[on_base].base && !dual.is_free[dual.place[on_base] as usize]);
+        assert_eq!(dual.group[on_base], None);
+    }
+
+    /// Where two soils meet each has its own points, at the same places.
+    #[test]
+    fn soils_have_their_own_points() {
+        let mut model = square_block(3);
+        model.regions.push(model.regions[0].clone());
+        model.region = vec![0, 0, 0, 0, 0, 0, 1, 1, 1];
+        let dual = DualLattice::new(&model);
+        assert_eq!((dual.position.len(), dual.places()), (20, 16));
+        let both: Vec<usize> = (0..dual.position.len())
+            .filter(|&s| (dual.position[s] - Vec2::new(0.5, 1.5)).norm() < 1e-9)
+            .collect();
+        assert_eq!(both.len(), 2);
+        assert_eq!(both.iter().map(|&s| dual.volume[s]).collect::<Vec<_>>(), [0.5, 0.5]);
+        assert_eq!(dual.place[both[0]], dual.place[both[1]]);
+        let regions: Vec<u32> = both.iter().map(|&s| model.region[dual.node[s] as usize]).collect();
+        assert_eq!(regions, [0, 1]);
+    }
+}

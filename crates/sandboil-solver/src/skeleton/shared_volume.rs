@@ -128,3 +128,71 @@ fn mean(group: &[u32], points: &[StressPoint], value: impl Fn(usize) -> f64) -> 
 fn mean_stress(point: &StressPoint) -> f64 {
     0.5 * (point.stress.xx + point.stress.yy)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        section::{description::Operators, outline::EdgesView},
+        skeleton::{spectrum_tests::disordered, strain_and_force::conservative_force},
+    };
+    use sandboil_soil::Stress;
+
+    const SIDE: usize = 5;
+
+    fn random(k: usize) -> f64 {
+        (1e4 * (0.618_034 * k as f64 + 0.3).sin()).sin()
+    }
+
+    /// The power of the forces on any motion is minus that of the effective stress in the strain of the soil plus that of
+    /// the pore pressure in its volume strain; the sum of the forces is zero.
+    #[test]
+    fn the_force_is_the_transpose_of_the_shared_strain() {
+        let mut model = disordered(SIDE, 0.1);
+        model.numerics.operators = Operators::Dual;
+        model.numerics.smoothing_ratio = 1.2;
+        let edges = EdgesView::statics(&model.outline);
+        let geometry = Geometry::build(&model, &model.position, &model.volume, edges);
+        let dual = DualLattice::new(&model);
+        assert!(dual.groups.len() > 3);
+        let velocity: Vec<Vec2> =
+            (0..model.nodes()).map(|j| Vec2::new(random(2 * j), random(2 * j + 1))).collect();
+        let mut points: Vec<StressPoint> = (0..dual.position.len())
+            .map(|s| StressPoint {
+                stress: Stress { xx: random(5 * s), yy: random(5 * s + 1), xy: random(5 * s + 2), zz: 0.0 },
+                density: 1.0,
+                volume: dual.volume[s],
+                deformation: Deformation::default()
+                    .moved(Vec2::new(0.1 * random(7 * s), 0.05), Vec2::new(-0.05, 0.1 * random(7 * s + 1))),
+                ..StressPoint::default()
+            })
+            .collect();
+        let pressure = |s: usize| 3.0 * random(11 * s);
+        let mut shared = SharedStrain::new(&dual);
+        let still = vec![Vec2::zeros(); model.nodes()];
+        let mut shares: Vec<NodalShare> = (0..points.len())
+            .map(|s| motion(&geometry, s, &still).share(&points[s], geometry.covariance[s], 0.0))
+            .collect();
+        shared.carry(false, &dual, &mut points, &mut shares, pressure);
+
+        // A rate: the deformation does not change.
+        let rate = |s: usize| motion(&geometry, s, &velocity).increment(&points[s].deformation, 1.0);
+        for (strain, group) in shared.strain.iter_mut().zip(&dual.groups) {
+            *strain = mean(group, &points, |s| rate(s).xx + rate(s).yy);
+        }
+        let stored: f64 = (0..points.len())
+            .map(|s| {
+                let strain = shared.applied(s, rate(s));
+                let StressPoint { stress, volume, deformation, .. } = &points[s];
+                let of_stress = stress.xx * strain.xx + stress.yy * strain.yy + stress.xy * strain.xy;
+                volume * deformation.volume_ratio() * (of_stress - pressure(s) * (strain.xx + strain.yy))
+            })
+            .sum();
+        let forces: Vec<Vec2> = (0..model.nodes())
+            .map(|j| conservative_force(&geometry, j, Vec2::zeros(), &shares, &points))
+            .collect();
+        let power: f64 = forces.iter().zip(&velocity).map(|(f, v)| f.dot(v)).sum();
+        assert!((power + stored).abs() < 1e-12 * stored.abs().max(1.0) * 100.0, "{power} {stored}");
+        assert!(forces.iter().sum::<Vec2>().norm() < 1e-12);
+    }
+}
