@@ -93,3 +93,71 @@ def test_an_undrained_heap_flows() -> None:
     """The conservative operators lock: their heap of ten rows stops at 0.22 m, from 0.2 m."""
     _, shown = result(heap(spacing=0.01, k=0.0, duration=2.0, operators="dual"), 2)
     assert shown["front, m"] == pytest.approx(0.37, abs=0.02)
+
+
+PULSE = sb.Motion.ricker(frequency=4.0, pga_g=0.2)
+SAND = sb.PM4Sand(Dr=0.4, G0=500.0, hpo=0.5)
+CLAY = sb.MohrCoulomb(c=20.0, phi=30.0, E=5e4, nu=0.3)
+SLOPE_45 = [(0.0, 0.0), (10.0, 0.0), (10.0, 2.0), (6.0, 2.0), (2.0, 6.0), (0.0, 6.0)]
+SLOPE_89 = [(0.0, 0.0), (10.0, 0.0), (10.0, 2.0), (4.07, 2.0), (4.0, 6.0), (0.0, 6.0)]
+NOTCH = [(0.0, 0.0), (10.0, 0.0), (10.0, 4.0), (6.0, 4.0), (6.0, 2.0), (5.0, 2.0), (5.0, 4.0), (0.0, 4.0)]
+
+
+def sand(width: float = 2.0, height: float = 4.0, k: float = 1e-4) -> sb.Region:
+    return sb.Region("sand", sb.box(x=(0, width), y=(0, height)), SAND, Gs=2.67, hydraulic_conductivity=k)
+
+
+def layers(moduli: tuple[float, float], conductivities: tuple[float, float]) -> list[sb.Region]:
+    """Two elastic layers of 2 m, from below."""
+    return [
+        sb.Region(
+            f"layer {i}",
+            sb.box(x=(0, 2), y=(2 * i, 2 * i + 2)),
+            sb.Elastic(E=modulus, nu=0.3),
+            porosity=0.4,
+            Gs=2.67,
+            hydraulic_conductivity=k,
+        )
+        for i, (modulus, k) in enumerate(zip(moduli, conductivities, strict=True))
+    ]
+
+
+def section(outline: list[tuple[float, float]]) -> list[sb.Region]:
+    return [sb.Region("clay", sb.polygon(outline), CLAY, porosity=0.4, Gs=2.67, hydraulic_conductivity=1e-6)]
+
+
+# Regions, and what else differs from a section 2 m wide between rollers under a water table at its surface.
+EXTREMES: dict[str, tuple[list[sb.Region], dict[str, object]]] = {
+    "one column": ([sand(width=0.5)], {"sides": sb.Periodic()}),
+    "two by two": ([sand(width=1.0, height=1.0)], {}),
+    "nearly undrained": ([sand(k=1e-12)], {}),
+    "drained at once": ([sand(k=1.0)], {}),
+    "soft water": ([sand()], {"water": sb.Water(bulk_modulus=2.2e4)}),
+    "stiff water": ([sand()], {"water": sb.Water(bulk_modulus=2.2e8)}),
+    "contrast of stiffness 1e4": (layers((2e7, 2e3), (1e-4, 1e-4)), {}),
+    "contrast of conductivity 1e8": (layers((2e5, 2e5), (1e-2, 1e-10)), {}),
+    "slope of 45 degrees in a pond": (section(SLOPE_45), {"water_table": sb.WaterTable(elevation=8.0)}),
+    "slope of 89 degrees in a pond": (section(SLOPE_89), {"water_table": sb.WaterTable(elevation=8.0)}),
+    "notch in a pond": (section(NOTCH), {"water_table": sb.WaterTable(elevation=8.0)}),
+}
+
+
+@pytest.mark.filterwarnings("ignore::sandboil.SandboilWarning")
+@pytest.mark.parametrize("name", EXTREMES)
+def test_extremes_are_stable(name: str) -> None:
+    """Half a second of shaking; the ground moves by millimetres."""
+    regions, changes = EXTREMES[name]
+    settings: dict[str, object] = {
+        "spacing": 0.5,
+        "water": sb.Water(),
+        "water_table": sb.WaterTable(depth=0.0),
+        "sides": sb.Roller(),
+        "stages": [sb.Gravity(), sb.Shaking(PULSE, duration=0.5)],
+    }
+    simulation = sb.Simulation(sb.Scene(regions=regions, numerics=DUAL, **(settings | changes)), threads=1)
+    while not simulation.is_complete:
+        simulation.run_stage()
+    moved = np.abs(simulation.field("displacement")).max()
+    print(f"{name}: {1e3 * moved:.2f} mm in {simulation.steps} steps, {simulation.flow_scheme}")
+    assert moved < 0.02
+    assert np.isfinite(simulation.field("excess_pore_pressure")).all()
