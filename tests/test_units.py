@@ -48,7 +48,7 @@ CASES: dict[str, tuple[Scene, str, str]] = {
     "conductivity in cm/s": (
         wet(
             regions=[
-                Region("sand", box(x=(0, 0.5), y=(0, 4)), scenes.LOOSE, hydraulic_conductivity=1.0, Gs=2.67)
+                Region("sand", box(x=(0, 0.5), y=(0, 4)), scenes.LOOSE, hydraulic_conductivity=10.0, Gs=2.67)
             ]
         ),
         "regions[0].hydraulic_conductivity",

@@ -103,6 +103,7 @@ def test_water_a_hundred_times_softer_is_stable_and_wrong_as_announced() -> None
     assert "B" in text
 
 
+@pytest.mark.filterwarnings("ignore:.*bulk_modulus:sandboil.SandboilWarning")
 def test_water_a_hundred_times_stiffer_changes_nothing_but_the_step() -> None:
     """Stable; the default water is nearly incompressible already."""
     stiff = respond(bulk_modulus=1.0e8)

@@ -255,6 +255,7 @@ def test_liquefied_sand_at_the_sides(tmp_path: object) -> None:
         assert difference.max() < 0.05
 
 
+@pytest.mark.filterwarnings("ignore:.*base.Vs:sandboil.SandboilWarning")
 @pytest.mark.parametrize("contrast", [1e-2, 1.0, 1e2])
 def test_half_spaces_softer_and_harder_than_the_ground(contrast: float, tmp_path: object) -> None:
     """Surface over outcrop of a layer on a half-space, 1/|cos kH + i a sin kH|, a the ratio of impedances."""

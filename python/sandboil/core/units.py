@@ -48,7 +48,7 @@ GRAVITY = 9.81
 UNIT_WEIGHT = Usual(8.0, 35.0, "kN/m3", (("Mg/m3", GRAVITY), ("kg/m3", GRAVITY / 1e3), ("N/m3", 1e-3)))
 DENSITY = Usual(0.8, 3.5, "Mg/m3", (("kg/m3", 1e-3), ("kN/m3", 1.0 / GRAVITY)))
 # From intact clay to open gravel (Terzaghi, Peck & Mesri 1996).
-CONDUCTIVITY = Usual(1e-14, 0.3, "m/s", (("cm/s", 1e-2), ("m/day", 1.0 / 86400.0)))
+CONDUCTIVITY = Usual(1e-14, 1.0, "m/s", (("cm/s", 1e-2), ("m/day", 1.0 / 86400.0)))
 ROCK_SPEED = Usual(60.0, 5000.0, "m/s", (("km/s", 1e3),))
 # Water with much air to none.
 WATER_MODULUS = Usual(1e2, 1e7, "kPa", (("GPa", 1e6), ("MPa", 1e3), ("Pa", 1e-3)))
@@ -86,7 +86,8 @@ def _of_region(path: str, region: Region, scene: Scene) -> list[str | None]:
         value = getattr(region, name)
         if value is not None:
             found.append(UNIT_WEIGHT.doubt(f"{path}.{name}", value))
-    if region.hydraulic_conductivity is not None:
+    # Zero is undrained.
+    if region.conductivity.major > 0.0:
         found.append(CONDUCTIVITY.doubt(f"{path}.hydraulic_conductivity", region.conductivity.major))
     material = region.material
     for name in ("c", "Su"):
