@@ -526,6 +526,7 @@ CATALOGUE: dict[str, dict[str, Slip]] = {
             adding(kind="reservoir", on="surface", x=[20.0, 30.0], level=4.0)
         ),
         "tolerance of one": seeping(to("stages.0.tolerance", 1.0)),
+        "tolerance of a steady state": seeping(to("stages.0.tolerance", 0.01)),
         "x that falls": seeping(adding(kind="seepage-face", on="surface", x=[5.0, 3.0])),
         "x on a vertical edge": seeping(to(f"{FIRST}.x", [0.0, 3.0])),
         "point off the edge": seeping(to(f"{FIRST}.on", [[0.0, 0.0], [3.0, 2.0]])),

@@ -1,12 +1,16 @@
 //! Sections that several tests use.
 
-use crate::section::{
-    description::{
-        AccelerationTerm, Conductivity, Diffusion, Model, Numerics, Operators, Region, STRESS_NODES,
+use crate::{
+    section::{
+        description::{
+            AccelerationTerm, Conductivity, Diffusion, Model, Numerics, Operators, Region, STRESS_NODES,
+        },
+        outline::Outline,
     },
-    outline::Outline,
+    stages::stage::{
+        BaseEdge, Damping, Displacements, Edges, End, Output, SideEdge, Stage, Surface, WaterReference,
+    },
 };
-
 use sandboil_soil::{Integrator, Soil, elastic::Elastic};
 use sandboil_sph::{Period, Vec2};
 
@@ -51,5 +55,20 @@ pub fn block(position: Vec<Vec2>, period: Option<Period>) -> Model {
             geometry_strain_limit: None,
             integrator: Integrator::default(),
         },
+    }
+}
+
+/// A stage of moving ground on held edges that does not end, with local damping and a factor of the time step.
+pub fn held_stage(local_damping: f64, time_step_factor: f64) -> Stage {
+    Stage {
+        edges: Edges { base: BaseEdge::Held, sides: [SideEdge::Held, SideEdge::Held] },
+        water_reference: WaterReference::AtRest,
+        surface: Surface::Tied,
+        displacements: Displacements::Small,
+        damping: Damping { local: local_damping, ..Damping::default() },
+        conditions: Vec::new(),
+        end: End::After(f64::MAX),
+        time_step_factor,
+        output: Output { history_interval: 1e8, ..Output::default() },
     }
 }

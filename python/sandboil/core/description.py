@@ -23,9 +23,8 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 # Distances over the spacing, in x and y, of the points around a stress point at which the stress at rest is
-# taken. They
-# differ, so that none is equally far from two nodes.
-BESIDE = (0.01, 0.02)
+# taken. They differ, so that none is equally far from two nodes.
+BESIDE = (1e-3, 2e-3)
 
 # A stage of grains.
 GrainStage = _core.Gravity | _core.Shaking | _core.RunOut

@@ -54,6 +54,10 @@ class _Stage(Model):
         return self.duration
 
 
+# Error of a step of seepage in time.
+DEFAULT_TOLERANCE = 0.002
+
+
 class Seepage(_Stage):
     """Water that flows through the ground at rest, before the other stages.
 
@@ -63,7 +67,7 @@ class Seepage(_Stage):
     In time, the ground stores water also by expansion of its skeleton under constant total vertical
     stress, with the small-strain moduli of its soils under the effective stress at rest. `tolerance` is
     the error of a time step, of degrees of saturation and of heads over their range; the error of the
-    result falls as its square root. The steady state does not use it.
+    result falls as its square root. A steady state has none.
     """
 
     _positional: ClassVar[tuple[str, ...]] = ("conditions",)
@@ -80,12 +84,24 @@ class Seepage(_Stage):
         json_schema_extra={"remedy": "86400 is a day; leave it out for the steady state"},
     )
     tolerance: Number = Field(
-        default=0.002,
+        default=DEFAULT_TOLERANCE,
         ge=1.0e-5,
         le=0.05,
         description="error of a time step, of saturation and of heads over their range",
         json_schema_extra={"remedy": "leave it out for 0.002"},
     )
+
+    @model_validator(mode="after")
+    def _no_idle_tolerance(self) -> Seepage:
+        """Refuse an error in time of a steady state."""
+        if self.duration is None and self.tolerance != DEFAULT_TOLERANCE:
+            raise InvalidInput(
+                f"{self._label}.tolerance",
+                self.tolerance,
+                "has no effect on a steady state, which has no steps in time",
+                "give a duration, or leave it out",
+            )
+        return self
 
     if TYPE_CHECKING:
 
@@ -94,7 +110,7 @@ class Seepage(_Stage):
             conditions: Sequence[AnyCondition],
             *,
             duration: float | None = None,
-            tolerance: float = 0.002,
+            tolerance: float = DEFAULT_TOLERANCE,
         ) -> None: ...
 
 

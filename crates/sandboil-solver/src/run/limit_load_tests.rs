@@ -11,10 +11,7 @@ use crate::{
         outline::{Outline, Side, Support},
         stress_layout::stress_positions,
     },
-    stages::stage::{
-        BaseEdge, Damping, Displacements, Edges, End, Output, SideEdge, Stage, Surface, WaterReference,
-    },
-    testing::block,
+    testing::{block, held_stage},
 };
 use sandboil_soil::{
     Soil,
@@ -33,6 +30,10 @@ const BULK: [f64; 2] = [2.17, 50.0];
 const SPEED: f64 = 2e-5;
 /// Settlement over the width at which the load is read: it hardly rises any more.
 const SETTLEMENT: f64 = 0.003;
+/// Local damping, and factor of the time step.
+const LOCAL_DAMPING: f64 = 0.3;
+/// See [`LOCAL_DAMPING`].
+const FACTOR: f64 = 0.6;
 /// Settlement over the width in which the load is averaged.
 const AVERAGED: f64 = 2e-4;
 
@@ -61,22 +62,8 @@ fn clay(operators: Operators, columns: usize, rows: usize) -> Model {
     model
 }
 
-fn stage() -> Stage {
-    Stage {
-        edges: Edges { base: BaseEdge::Held, sides: [SideEdge::Held, SideEdge::Held] },
-        water_reference: WaterReference::AtRest,
-        surface: Surface::Tied,
-        displacements: Displacements::Small,
-        damping: Damping { local: 0.3, ..Damping::default() },
-        conditions: Vec::new(),
-        end: End::After(1e9),
-        time_step_factor: 0.6,
-        output: Output { history_interval: 1e6, ..Output::default() },
-    }
-}
-
 fn domain(driver: &mut Driver<Alone>) -> &mut Domain {
-    driver.begin(stage()).unwrap();
+    driver.begin(held_stage(LOCAL_DAMPING, FACTOR)).unwrap();
     let Active::Moving(_) = &driver.active else { unreachable!() };
     &mut driver.domain
 }
@@ -133,7 +120,7 @@ fn rough_strip_footing() {
 
 /// The load comes closer to the exact one with more nodes.
 #[test]
-#[ignore = "half a minute with optimisation"]
+#[ignore = "ten seconds with optimisation, minutes without"]
 fn finer_strip_footing() {
     assert!(error(Operators::Dual, 16).abs() < 0.02);
 }

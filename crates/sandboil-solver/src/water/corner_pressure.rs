@@ -32,7 +32,8 @@ pub struct CornerFlow {
     pressed: Vec<f64>,
     /// Volume of each place, m2.
     volume: Vec<f64>,
-    /// Whether the excess of a place stays zero: at an open surface, and beside soil that holds air.
+    /// Whether the excess of a place stays zero: at an open surface, and beside soil that holds air, where the soil is
+    /// permeable.
     is_held: Vec<bool>,
     /// Whether every cell that touches a place holds air.
     is_dry: Vec<bool>,
@@ -66,15 +67,20 @@ impl CornerFlow {
         let water = model.water?;
         let of_node: Vec<[u32; CORNERS]> =
             dual.of_node.iter().map(|points| points.map(|point| dual.place[point as usize])).collect();
-        let (mut holds_air, mut is_dry) = (vec![false; dual.places()], vec![true; dual.places()]);
+        let mut is_permeable = vec![false; dual.places()];
+        let (mut holds_air, mut is_dry) = (is_permeable.clone(), vec![true; dual.places()]);
         for (node, places) in of_node.iter().enumerate() {
             let is_dry_cell = model.saturation(node) < 1.0;
+            let region = &model.regions[model.region[node] as usize];
             for &place in places {
+                is_permeable[place as usize] |= region.hydraulic_conductivity.major > 0.0;
                 holds_air[place as usize] |= is_dry_cell;
                 is_dry[place as usize] &= is_dry_cell;
             }
         }
-        let is_held = holds_air.iter().zip(&dual.is_free).map(|(air, free)| *air || *free).collect();
+        let is_held = (0..dual.places())
+            .map(|place| is_permeable[place] && (holds_air[place] || dual.is_free[place]))
+            .collect();
         let mut flow = Self {
             water,
             excess: vec![0.0; dual.places()],
@@ -326,4 +332,46 @@ impl CornerFlow {
 /// Volume strain of the soil at a point since the stage began, tension positive.
 fn volume_strain(point: &StressPoint) -> f64 {
     point.strain[0] + point.strain[1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        run::ground::Ground,
+        section::{
+            description::{Conductivity, Operators},
+            outline::Outline,
+            stress_layout::stress_positions,
+        },
+        testing::square_block,
+    };
+
+    const SIDE: usize = 4;
+
+    /// Permeable ground drains at its surface; a layer that lets no water through does not, also above ground that does.
+    #[test]
+    fn only_a_permeable_surface_is_drained() {
+        for (upper, drained) in [(1.0, true), (0.0, false)] {
+            let mut model = square_block(SIDE);
+            model.numerics.operators = Operators::Dual;
+            model.outline = Outline::level(-0.5);
+            model.water = Some(Water { unit_weight: 10.0, bulk_modulus: 1e6 });
+            model.pore_pressure = model.position.iter().map(|x| 10.0 * (SIDE as f64 - x.y)).collect();
+            model.regions.push(model.regions[0].clone());
+            for (region, k) in model.regions.iter_mut().zip([1.0, upper]) {
+                region.hydraulic_conductivity = Conductivity::isotropic(k);
+            }
+            model.region = (0..model.nodes()).map(|node| u32::from(node >= 2 * SIDE)).collect();
+            model.vertical_effective_stress = vec![0.0; stress_positions(&model).len()];
+            let ground = Ground::new(&model).unwrap();
+            let outline = ground.outline();
+            let flow = CornerFlow::new(ground.view(&outline), FlowScheme::Explicit).unwrap();
+            let places = ground.layout.dual().unwrap().place_positions();
+            let at_top = |place: &usize| places[*place].y > SIDE as f64 - 1.0;
+            let (top, below): (Vec<usize>, Vec<usize>) = (0..places.len()).partition(at_top);
+            assert!(top.iter().all(|&place| flow.is_held[place] == drained), "{upper}");
+            assert!(below.iter().any(|&place| !flow.is_held[place]));
+        }
+    }
 }

@@ -16,7 +16,7 @@ use crate::{
         description::{Model, STRESS_NODES, Water, positive},
         node_id::id,
         order::sorted,
-        stress_layout::check_stress,
+        stress_layout::{StressLayout, check_stress},
     },
     water::{
         conditions::{Cell, Cells, Demand, HydraulicBoundary},
@@ -237,8 +237,9 @@ impl Seepage {
     /// # Errors
     /// [`SolverError::Soil`] where a soil refuses the stress.
     pub fn with_expanding_skeleton(mut self, model: &Model) -> Result<Self, SolverError> {
+        let layout = StressLayout::new(model);
         for (compliance, &node) in self.compliance.iter_mut().zip(&self.order) {
-            *compliance = confined_modulus(model, node)?.recip();
+            *compliance = confined_modulus(model, &layout, node)?.recip();
         }
         Ok(self)
     }
@@ -760,11 +761,11 @@ impl Seepage {
 }
 
 /// Small-strain modulus of confined compression of a node's soil under its effective stress at rest, kPa.
-fn confined_modulus(model: &Model, node: usize) -> Result<f64, SolverError> {
+fn confined_modulus(model: &Model, layout: &StressLayout, node: usize) -> Result<f64, SolverError> {
     let region = model.region[node] as usize;
     let soil = &model.regions[region];
-    let points = &model.vertical_effective_stress[STRESS_NODES * node..STRESS_NODES * (node + 1)];
-    let vertical = -points.iter().sum::<f64>() / STRESS_NODES as f64;
+    let of_point = |(point, share): (usize, f64)| share * model.vertical_effective_stress[point];
+    let vertical = -layout.of_node(node).map(of_point).sum::<f64>();
     let lateral = soil.earth_pressure_coefficient * vertical;
     let stress = Stress { xx: lateral, yy: vertical, xy: 0.0, zz: lateral };
     let moduli = soil.soil.small_strain_moduli(stress);

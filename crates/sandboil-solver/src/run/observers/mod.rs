@@ -56,8 +56,8 @@ impl Observers {
         self.energy.strain(stress, water);
     }
 
-    /// At the end of a step, with the work of stress and water `after` it in its strain: takes a sample of energy if one `is_due`, and completes the histories if the
-    /// stage `is_over`.
+    /// At the end of a step: takes a sample of energy if one `is_due`, with the work of stress and pore pressure
+    /// `after` the step in its strain, and completes the histories if the stage `is_over`.
     pub fn end_step(&mut self, domain: &Domain, after: [f64; 2], is_due: bool, is_over: bool) {
         let Domain { ground, clock, .. } = domain;
         if is_due {
