@@ -17,9 +17,10 @@ use sandboil_sph::Vec2;
 /// State and motion of a column in a step, for the section beside it. Rows are numbered from below.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Present {
-    /// Nominal effective stress of both stress nodes of each row at the start of the step, kPa.
+    /// Nominal stress of two stress points of each row at the start of the step, kPa: of its stress nodes, or of the lower
+    /// and the upper corner of its cell, with the excess pore pressure there.
     pub stress: Vec<[f64; COMPONENTS]>,
-    /// Nominal excess pore pressure of each row, `q J F^-T`, kPa; empty without water.
+    /// Nominal excess pore pressure of each row, `q J F^-T`, kPa; empty without water at the nodes.
     pub water: Vec<[f64; COMPONENTS]>,
     /// Velocity of each row half a step before the start of the step, m/s.
     pub velocity_before: Vec<Vec2>,
@@ -79,7 +80,7 @@ impl Column {
             simulation.advance(u64::MAX, f64::INFINITY)?;
         }
         let rows = simulation.internal_order();
-        let present = Present::of_rows(rows.len(), model.water.is_some());
+        let present = Present::of_rows(rows.len(), model.has_nodal_water());
         let source = Source::Solved { simulation: Box::new(simulation), rows };
         Ok(Self { source, present, recorder: None })
     }
@@ -161,7 +162,11 @@ impl Column {
     /// Sets the excess pore pressure of each row, kPa. Constant forces keep the balance.
     pub fn set_excess(&mut self, excess: impl Iterator<Item = f64>) {
         if let Source::Solved { simulation, rows } = &mut self.source {
-            simulation.hold_excess(rows.iter().copied().zip(excess));
+            let mut own = vec![0.0; rows.len()];
+            for (&node, value) in rows.iter().zip(excess) {
+                own[node] = value;
+            }
+            simulation.hold_excess(&own);
         }
         self.observe();
     }
@@ -185,9 +190,8 @@ impl Column {
         match &mut self.source {
             Source::Solved { simulation, rows } => {
                 for (row, &node) in rows.iter().enumerate() {
-                    for k in 0..STRESS_NODES {
-                        stress[STRESS_NODES * row + k] = simulation.nominal_stress(STRESS_NODES * node + k);
-                    }
+                    stress[STRESS_NODES * row..][..STRESS_NODES]
+                        .copy_from_slice(&simulation.nominal_stress(node));
                     if let Some(water) = water.get_mut(row) {
                         *water = simulation.nominal_water(node);
                     }

@@ -25,10 +25,11 @@ use crate::{
         time_step::{PressureCoupling, TimeLimit},
     },
     section::{
-        description::{Model, STRESS_NODES},
+        description::Model,
         edge_nodes::EdgeNodes,
         node_id::id,
         outline::{Hand, Outline, Side},
+        stress_layout::StressLayout,
     },
     skeleton::{point::StressPoint, section_view::SectionView},
     stages::{column_record::ColumnRecord, gravity::Gravity, stage::Stage},
@@ -122,7 +123,7 @@ impl Neighbour for FreeField {
                 (None, recorded) => {
                     free_field.columns.push(match recorded {
                         Some(record) => {
-                            record.validate(model.nodes(), model.water.is_some(), stage.duration())?;
+                            record.validate(model.nodes(), model.has_nodal_water(), stage.duration())?;
                             Column::recorded(record.clone())
                         }
                         None => {
@@ -307,8 +308,8 @@ impl Neighbour for FreeField {
         let path = |node: usize| (velocity[node] - acceleration[node] * (0.5 * dt)) * dt;
         let copies = velocity.len() - self.copied_velocities();
         let strained = |&s: &usize| {
-            let StressPoint { stress, volume, deformation, .. } = &points[s];
-            let nominal = deformation.cofactor().nominal(stress);
+            let point @ StressPoint { volume, deformation, .. } = &points[s];
+            let nominal = deformation.cofactor().nominal(&point.total_stress());
             let copied = geometry.wall.forward.iter_row(s).filter(|(column, _)| *column >= copies);
             copied.map(|(column, weight)| weight.contract(nominal).dot(&path(column)) * volume).sum::<f64>()
         };
@@ -392,15 +393,12 @@ pub fn column_model(model: &Model, edges: &EdgeNodes, hand: Hand) -> Model {
     let x = nodes.first().map_or(0.0, |&node| model.position[node].x);
     let pick = |values: &[f64]| nodes.iter().filter_map(|&node| values.get(node).copied()).collect();
     let middle = 0.5 * model.spacing.x;
-    Model {
+    let mut column = Model {
         position: nodes.iter().map(|&node| Vec2::new(middle, model.position[node].y)).collect(),
         volume: pick(&model.volume),
         region: nodes.iter().map(|&node| model.region[node]).collect(),
         surface_elevation: pick(&model.surface_elevation),
-        vertical_effective_stress: nodes
-            .iter()
-            .flat_map(|&node| [0, 1].map(|k| model.vertical_effective_stress[STRESS_NODES * node + k]))
-            .collect(),
+        vertical_effective_stress: Vec::new(),
         pore_pressure: pick(&model.pore_pressure),
         saturation: pick(&model.saturation),
         period: Some(Period { width: model.spacing.x }),
@@ -409,7 +407,14 @@ pub fn column_model(model: &Model, edges: &EdgeNodes, hand: Hand) -> Model {
             ..Outline::level(model.outline.base_elevation(x))
         },
         ..model.clone()
-    }
+    };
+    let (of_section, of_column) = (StressLayout::new(model), StressLayout::new(&column));
+    let beside = |point: usize| {
+        let node = nodes[of_column.node(point)];
+        model.vertical_effective_stress[of_section.beside(node, hand)[of_column.level(point)]]
+    };
+    column.vertical_effective_stress = (0..of_column.count(nodes.len())).map(beside).collect();
+    column
 }
 
 /// Whether two columns have the same rows.

@@ -16,7 +16,7 @@ use crate::{
     },
 };
 use sandboil_sph::{Csr, LeastSquaresFit, NeighbourList, Vec2, WendlandQuintic};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Difference of the weights of a complete and a cut stencil that is still round-off, times the spacing.
 pub const NO_DIFFERENCE: f64 = 1e-12;
@@ -121,43 +121,48 @@ impl SideTables {
 
         let mut tables = Self::default();
         let mut stress: Vec<Vec<(u32, VectorWeight)>> = vec![Vec::new(); strip.local.len()];
-        let stress_position = stress_node_positions(&strip.position, model.spacing);
-        let (in_cut, in_whole) = (list(&stress_position, &cut), list(&stress_position, &whole));
-        for (s, &at) in stress_position.iter().enumerate() {
-            let (node, k) = (s / STRESS_NODES, s % STRESS_NODES);
-            let mut weights: BTreeMap<u32, VectorWeight> = BTreeMap::new();
-            let mut take = |stencils: &Stencils, list: &NeighbourList, sign: f64| {
-                let Some(found) = StrainRow::least_squares(stencils, &stencils.all(list, s, at)) else {
-                    return;
-                };
-                let free = found.free.iter().map(|(owner, g)| (*owner, VectorWeight::plain(g.gradient)));
-                for (owner, mut weight) in free.chain(found.walls) {
-                    weight *= sign;
-                    *weights.entry(owner).or_default() += weight;
-                }
+        let points = strip.stress_points(section, hand);
+        let places: Vec<Vec2> = points.iter().map(|point| point.at).collect();
+        let (in_cut, in_whole) = (list(&places, &cut), list(&places, &whole));
+        for (s, point) in points.iter().enumerate() {
+            let row = |stencils: &Stencils, list: &NeighbourList| {
+                StrainRow::least_squares(stencils, &stencils.all(list, s, point.at))
             };
-            take(&whole_stencils, &in_whole, 1.0);
-            if node < strip.local.len() {
-                take(&cut_stencils, &in_cut, -1.0);
-            }
+            let whole = row(&whole_stencils, &in_whole);
+            let cut = point.in_section.and_then(|_| row(&cut_stencils, &in_cut));
+            // Weights of the complete stencil times `factor`, minus those of the cut one.
+            let difference = |factor: f64| {
+                let mut weights: BTreeMap<u32, VectorWeight> = BTreeMap::new();
+                for (found, factor) in [(&whole, factor), (&cut, -1.0)] {
+                    let Some(found) = found else { continue };
+                    let free = found.free.iter().map(|(owner, g)| (*owner, VectorWeight::plain(g.gradient)));
+                    for (owner, mut weight) in free.chain(found.walls.iter().copied()) {
+                        weight *= factor;
+                        *weights.entry(owner).or_default() += weight;
+                    }
+                }
+                weights
+            };
+            let weights = difference(1.0);
             // In these weights every node moves as the row of the column at its height.
             let near = weights.values().any(|weight| weight.magnitude() > negligible);
-            if node < strip.local.len() && near {
+            if let (Some(s), true) = (point.in_section, near) {
                 let rows =
                     weights.iter().map(|(&owner, &weight)| (id(strip.row_or_end[owner as usize]), weight));
-                tables.strain.insert(STRESS_NODES * strip.local[node] + k, rows.collect());
+                tables.strain.insert(s, rows.collect());
             }
-            let Some(row) = strip.row[node] else { continue };
+            let Some(of_column) = point.of_column else { continue };
+            let weights = if point.parts == 1.0 { weights } else { difference(point.parts) };
             for (owner, mut weight) in weights {
                 if (owner as usize) < strip.local.len() && weight.magnitude() > negligible {
-                    weight *= strip.volume[node] / STRESS_NODES as f64;
-                    stress[owner as usize].push((id(STRESS_NODES * row + k), weight));
+                    weight *= point.volume;
+                    stress[owner as usize].push((id(of_column), weight));
                 }
             }
         }
 
         let mut pressure: Vec<Vec<(u32, Vec2)>> = vec![Vec::new(); strip.local.len()];
-        if model.water.is_some() {
+        if model.has_nodal_water() {
             let (in_cut, in_whole) = (list(&strip.position, &cut), list(&strip.position, &whole));
             for (node, &at) in strip.position.iter().enumerate() {
                 let mut weights: BTreeMap<u32, Vec2> = BTreeMap::new();
@@ -200,6 +205,19 @@ impl SideTables {
     }
 }
 
+/// A stress point near a side.
+struct StripPoint {
+    at: Vec2,
+    /// Index in the section; none beyond the side.
+    in_section: Option<usize>,
+    /// Index among the stresses of the column; none above and below the column.
+    of_column: Option<usize>,
+    /// Volume, m2; in the section the part that belongs to it.
+    volume: f64,
+    /// The volume of the point in ground that continues beyond the side, over its volume.
+    parts: f64,
+}
+
 /// The nodes near a side, and copies of the column beyond it, as far as stencils reach.
 struct Strip {
     /// Nodes of the section near the side.
@@ -211,6 +229,9 @@ struct Strip {
     row: Vec<Option<usize>>,
     /// The same, with the last row above the column and the first row below it.
     row_or_end: Vec<usize>,
+    rows: Rows,
+    /// Distance from the side within which nodes belong to the strip, m.
+    reach: f64,
 }
 
 impl Strip {
@@ -230,18 +251,70 @@ impl Strip {
             row: local.iter().map(|&node| rows.at(model.position[node].y)).collect(),
             row_or_end: local.iter().map(|&node| rows.nearest(model.position[node].y)).collect(),
             local,
+            rows,
+            reach,
         };
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // small and positive
-        let repeats = (reach / model.spacing.x).ceil() as usize + 1;
-        for repeat in 1..=repeats {
+        for shift in strip.shifts(section, hand) {
             for (row, &node) in side.iter().enumerate() {
-                strip.position.push(position[node] + hand.normal() * (repeat as f64 * model.spacing.x));
+                strip.position.push(position[node] + shift);
                 strip.volume.push(phases.volume()[node]);
                 strip.row.push(Some(row));
                 strip.row_or_end.push(row);
             }
         }
         strip
+    }
+
+    /// Displacements from the section's outermost nodes to the copies beyond them, m.
+    fn shifts(&self, section: &SectionView, hand: Hand) -> impl Iterator<Item = Vec2> + use<> {
+        let spacing = section.model.spacing.x;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // small and positive
+        let repeats = (self.reach / spacing).ceil() as usize + 1;
+        (1..=repeats).map(move |repeat| hand.normal() * (repeat as f64 * spacing))
+    }
+
+    /// The stress points of the strip.
+    fn stress_points(&self, section: &SectionView, hand: Hand) -> Vec<StripPoint> {
+        let SectionView { model, layout, points, .. } = section;
+        let of_column = |node: usize, point: usize| {
+            self.rows.at(model.position[node].y).map(|row| STRESS_NODES * row + layout.level(point))
+        };
+        let Some(dual) = layout.dual() else {
+            let places = stress_node_positions(&self.position, model.spacing);
+            let point = |(s, at): (usize, Vec2)| {
+                let (node, k) = (s / STRESS_NODES, s % STRESS_NODES);
+                StripPoint {
+                    at,
+                    in_section: self.local.get(node).map(|&node| STRESS_NODES * node + k),
+                    of_column: self.row[node].map(|row| STRESS_NODES * row + k),
+                    volume: self.volume[node] / STRESS_NODES as f64,
+                    parts: 1.0,
+                }
+            };
+            return places.into_iter().enumerate().map(point).collect();
+        };
+        let is_on_side = |s: usize| dual.on[s].side == Some(hand);
+        let near: BTreeSet<usize> =
+            self.local.iter().flat_map(|&node| dual.of_node[node].map(|s| s as usize)).collect();
+        // Ground that continues beyond the side has as much of a point on it as the section.
+        let continued = 2.0;
+        let own = near.iter().map(|&s| StripPoint {
+            at: dual.position[s],
+            in_section: Some(s),
+            of_column: of_column(dual.node[s] as usize, s),
+            volume: points[s].volume,
+            parts: if is_on_side(s) { continued } else { 1.0 },
+        });
+        let beyond = self.shifts(section, hand).flat_map(|shift| {
+            near.iter().filter(|&&s| is_on_side(s)).map(move |&s| StripPoint {
+                at: dual.position[s] + shift,
+                in_section: None,
+                of_column: of_column(dual.node[s] as usize, s),
+                volume: continued * points[s].volume,
+                parts: 1.0,
+            })
+        });
+        own.chain(beyond).collect()
     }
 
     /// The first `count` nodes with their images.

@@ -21,7 +21,6 @@ use crate::{
     section::{
         description::{AccelerationTerm, Diffusion, Model, Operators},
         outline::{Outline, Walls},
-        stress_layout::StressLayout,
     },
     skeleton::{
         contacts::Contacts, inertia::Dispersion, rayleigh::RayleighDamping, soils::SoilField,
@@ -157,8 +156,8 @@ impl<N: Neighbour> Driver<N> {
         }
         let Domain { ground, clock, .. } = &mut self.domain;
         // With large displacements there are no constant forces.
-        let (Active::Moving(stage), 0, Some(water), None) =
-            (&mut self.active, clock.step, &mut ground.water, ground.sharpness)
+        let (Active::Moving(stage), 0, Some(_), None) =
+            (&mut self.active, clock.step, &ground.water, ground.sharpness)
         else {
             return Err(SolverError::Order {
                 call: "set_excess_pore_pressure",
@@ -166,13 +165,7 @@ impl<N: Neighbour> Driver<N> {
             });
         };
         let own: Vec<f64> = ground.order.iter().map(|&user| excess[user]).collect();
-        match (water, &ground.layout) {
-            (PoreWater::Nodes(flow), _) => flow.set_excess(|excess| excess.copy_from_slice(&own)),
-            (PoreWater::Corners(flow), StressLayout::Dual(dual)) => {
-                flow.set_from_nodes(&ground.model, &ground.position, dual, &own);
-            }
-            (PoreWater::Corners(_), StressLayout::Diagonal) => {}
-        }
+        ground.set_excess(&own);
         if let Some(neighbour) = &mut stage.neighbour {
             neighbour.set_excess(&ground.edges, &own);
         }

@@ -207,6 +207,17 @@ impl Ground {
         self.water = Some(water);
     }
 
+    /// Sets the excess pore pressure from that of the nodes, kPa.
+    pub fn set_excess(&mut self, excess: &[f64]) {
+        match (&mut self.water, &self.layout) {
+            (Some(PoreWater::Nodes(flow)), _) => flow.set_excess(|own| own.copy_from_slice(excess)),
+            (Some(PoreWater::Corners(flow)), StressLayout::Dual(dual)) => {
+                flow.set_from_nodes(&self.model, &self.position, dual, excess);
+            }
+            _ => {}
+        }
+    }
+
     /// Sets the number of copies of a neighbour's motion after the nodes.
     pub fn resize_copies(&mut self, copies: usize) {
         for motion in [&mut self.velocity, &mut self.acceleration] {

@@ -15,7 +15,10 @@ use crate::{
         simulation::{Active, Driver},
         time_step::{Criterion, PressureCoupling, TimeLimit},
     },
-    section::description::Operators,
+    section::{
+        description::{Operators, STRESS_NODES},
+        outline::Hand,
+    },
     skeleton::{
         contacts::Contacts, point::StressPoint, printed::PrintedStress, rayleigh::RayleighDamping,
         shared_volume::SharedStrain,
@@ -265,10 +268,13 @@ impl<N: Neighbour> Driver<N> {
         self.domain.ground.acceleration[node]
     }
 
-    /// Nominal effective stress `[xx, xy, yx, yy]` of a stress node, kPa.
-    pub(crate) fn nominal_stress(&self, s: usize) -> [f64; 4] {
-        let StressPoint { deformation, stress, .. } = &self.domain.ground.points[s];
-        deformation.cofactor().nominal(stress)
+    /// Nominal stress `[xx, xy, yx, yy]` of both stress points of the node of a column one node wide, kPa: effective, with
+    /// the excess pore pressure where that is computed at the stress points.
+    pub(crate) fn nominal_stress(&self, node: usize) -> [[f64; 4]; STRESS_NODES] {
+        let Ground { layout, points, .. } = &self.domain.ground;
+        layout
+            .beside(node, Hand::Left)
+            .map(|s| points[s].deformation.cofactor().nominal(&points[s].total_stress()))
     }
 
     /// Nominal excess pore pressure `q J F^-T` of a node, kPa; zero without water.
@@ -308,11 +314,9 @@ impl<N: Neighbour> Driver<N> {
         self.domain.ground.is_strained()
     }
 
-    /// Sets the excess pore pressure of nodes, kPa, and holds it in balance by a load.
-    pub(crate) fn hold_excess(&mut self, excess: impl Iterator<Item = (usize, f64)>) {
-        if let Some(flow) = self.domain.ground.water.as_mut().and_then(PoreWater::nodes_mut) {
-            flow.set_excess(|own| excess.for_each(|(node, value)| own[node] = value));
-        }
+    /// Sets the excess pore pressure of the nodes, kPa, and holds it in balance by a load.
+    pub(crate) fn hold_excess(&mut self, excess: &[f64]) {
+        self.domain.ground.set_excess(excess);
         self.domain.balance_under_load();
     }
 }

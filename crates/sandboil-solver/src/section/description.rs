@@ -189,6 +189,11 @@ pub fn stress_node_offset(spacing: Vec2) -> Vec2 {
 }
 
 impl Model {
+    /// Whether pore water has its pressure at the nodes, and not at the corners of cells.
+    pub fn has_nodal_water(&self) -> bool {
+        self.water.is_some() && self.numerics.operators != Operators::Dual
+    }
+
     /// Number of velocity nodes.
     pub fn nodes(&self) -> usize {
         self.position.len()

@@ -5,6 +5,7 @@ use crate::{
     section::{
         description::{Model, Operators, STRESS_NODES, stress_node_offset},
         dual_lattice::DualLattice,
+        outline::Hand,
     },
 };
 use sandboil_sph::Vec2;
@@ -94,6 +95,27 @@ impl StressLayout {
         match self {
             Self::Diagonal => of_nodes[point / STRESS_NODES] / STRESS_NODES as f64,
             Self::Dual(dual) => dual.volume[point],
+        }
+    }
+
+    /// Stress points of a node beside a side, from which a column beyond it continues: its two stress nodes, or the lower
+    /// and the upper corner of its cell on that side.
+    pub fn beside(&self, node: usize, hand: Hand) -> [usize; STRESS_NODES] {
+        match (self, hand) {
+            (Self::Diagonal, _) => [STRESS_NODES * node, STRESS_NODES * node + 1],
+            (Self::Dual(dual), Hand::Left) => [0, 3].map(|corner| dual.of_node[node][corner] as usize),
+            (Self::Dual(dual), Hand::Right) => [1, 2].map(|corner| dual.of_node[node][corner] as usize),
+        }
+    }
+
+    /// Which of the two points of [`Self::beside`] lies at the height of a point in the cell of its node.
+    pub fn level(&self, point: usize) -> usize {
+        match self {
+            Self::Diagonal => point % STRESS_NODES,
+            Self::Dual(dual) => {
+                let corners = dual.of_node[dual.node[point] as usize];
+                usize::from(corners[..STRESS_NODES].iter().all(|&corner| corner as usize != point))
+            }
         }
     }
 

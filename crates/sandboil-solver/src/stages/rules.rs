@@ -152,8 +152,8 @@ pub const RULES: [Rule; 12] = [
     Rule {
         name: "dual lattice with edges that it does not have",
         choice: "operators",
-        expected: "conservative beside free-field sides, on an uneven base, and with hydraulic conditions in motion",
-        breaks: |c| c.dual_operators && (c.free_field || c.uneven_base || c.hydraulic_conditions),
+        expected: "conservative on an uneven base, and with hydraulic conditions in motion",
+        breaks: |c| c.dual_operators && (c.uneven_base || c.hydraulic_conditions),
     },
     Rule {
         name: "dual lattice with physics that it does not have",

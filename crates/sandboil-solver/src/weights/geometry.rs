@@ -90,8 +90,7 @@ impl Geometry {
         } else {
             wall_table
         };
-        let has_flow = model.water.is_some() && model.numerics.operators != Operators::Dual;
-        let flow = has_flow.then(|| flow_tables(&stencils, &list.from_velocity, position));
+        let flow = model.has_nodal_water().then(|| flow_tables(&stencils, &list.from_velocity, position));
         let printed = (model.numerics.operators == Operators::Printed)
             .then(|| printed_tables(&stencils, &list, position, &stress_position, edges));
         let nodes = position.len();
