@@ -763,7 +763,6 @@ CATALOGUE: dict[str, dict[str, Slip]] = {
             to("stages", [{"kind": "gravity"}]),
             to("numerics", {"operators": "printed"}),
         ),
-        "dual lattice beside free-field sides": slope(to("numerics", {"operators": "dual"})),
         "dual lattice with corrected inertia": level(
             to("numerics", {"operators": "dual", "dispersion_correction": True})
         ),

@@ -189,13 +189,16 @@ def test_slopes_are_filled_and_carry_their_own_overburden(points: Any) -> None:
     surface = np.interp(x, *outline.surface.T)
     np.testing.assert_allclose(particles.surface_elevation, surface, atol=1e-4)
     np.testing.assert_allclose(particles.sigma_v_eff0, 18.0 * (surface - y), atol=2e-3)
-    # The lowest particle of a column stands in the middle of a cell that reaches down to the base.
-    _, lowest = np.unique(x, return_index=True)
-    height = particles.volume[lowest] / particles.spacing[0]
-    np.testing.assert_allclose(y[lowest] - np.interp(x[lowest], *outline.base.T), 0.5 * height, atol=1e-9)
-    assert (np.abs(height / particles.spacing[1] - 1.0) <= 0.5 + 1e-6).all()
-    above = np.setdiff1d(np.arange(len(x)), lowest)
-    np.testing.assert_allclose(particles.volume[above], np.prod(particles.spacing))
+    # The three lowest particles of a column stand in the middle of equal cells that reach down to the base.
+    base = np.interp(x, *outline.base.T)
+    height = particles.volume / particles.spacing[0]
+    order = np.lexsort((y, x))
+    row = np.empty(len(x), dtype=int)
+    row[order] = np.arange(len(x)) - np.searchsorted(x[order], x[order])
+    stretched = row < 3
+    np.testing.assert_allclose((y - base)[stretched], ((row + 0.5) * height)[stretched], atol=1e-9)
+    assert (np.abs(height / particles.spacing[1] - 1.0) <= 1.0 / 6.0 + 1e-6).all()
+    np.testing.assert_allclose(particles.volume[~stretched], np.prod(particles.spacing))
 
 
 @pytest.mark.parametrize("angle", [5.0, -15.0])

@@ -458,7 +458,6 @@ class Choices:
         water: bool = False,
         retention: bool = False,
         acceleration_term: bool = False,
-        uneven_base: bool = False,
         periodic_sides: bool = False,
         free_field: bool = False,
         open_sides: bool = False,

@@ -15,11 +15,21 @@ UNIT_WEIGHT = 20.0
 K0 = 0.5
 
 
-def at_rest(points: list[tuple[float, float]], spacing: float) -> sb.Simulation:
+OPERATORS = ("conservative", "dual")
+
+
+def at_rest(points: list[tuple[float, float]], spacing: float, operators: str) -> sb.Simulation:
     """Elastic ground between smooth sides, at rest."""
     soil = sb.Region("soil", sb.polygon(points), sb.Elastic(G=4e4, K=8e4), dry_unit_weight=UNIT_WEIGHT, K0=K0)
     simulation = sb.Simulation(
-        sb.Scene(spacing=spacing, regions=[soil], sides=sb.Roller(), stages=[sb.Gravity()]), threads=1
+        sb.Scene(
+            spacing=spacing,
+            regions=[soil],
+            sides=sb.Roller(),
+            stages=[sb.Gravity()],
+            numerics=sb.Numerics(operators=operators),
+        ),
+        threads=1,
     )
     assert not simulation.doubts
     simulation.run_stage()
@@ -31,7 +41,7 @@ def largest_by_row(error: Floats, height: Floats, rows: int) -> list[float]:
     return [float(error[(height >= row) & (height < row + 1)].max()) for row in range(rows)]
 
 
-def on_infinite_slope(angle: float, spacing: float) -> tuple[list[float], list[float]]:
+def on_infinite_slope(angle: float, spacing: float, operators: str) -> tuple[list[float], list[float]]:
     """Errors of normal and shear stress along the slope over the normal stress, in rows of the lower half.
 
     Six metres of soil in a slope 60 m long, of which the middle third is looked at.
@@ -41,7 +51,7 @@ def on_infinite_slope(angle: float, spacing: float) -> tuple[list[float], list[f
     left = max(0.0, -slope * width)
     right = left + slope * width
     simulation = at_rest(
-        [(0, left), (width, right), (width, right + thickness), (0, left + thickness)], spacing
+        [(0, left), (width, right), (width, right + thickness), (0, left + thickness)], spacing, operators
     )
     x, y = simulation.particles.position.T
     stress = simulation.fields(["sigma_h_eff", "sigma_v_eff", "tau_xy"])
@@ -57,20 +67,22 @@ def on_infinite_slope(angle: float, spacing: float) -> tuple[list[float], list[f
     errors = np.abs(normal[middle] + weight * cos**2), np.abs(along[middle] + weight * sin * cos)
     found = [largest_by_row(error / (weight * cos**2), *of_rows) for error in errors]
     shown = [" ".join(f"{100.0 * error:.1f}" for error in one) for one in found]
-    print(f"{angle:g} degrees, dx {spacing:g} m: normal {shown[0]}; shear {shown[1]} %")
+    print(f"{operators}, {angle:g} degrees, dx {spacing:g} m: normal {shown[0]}; shear {shown[1]} %")
     return found[0], found[1]
 
 
+@pytest.mark.parametrize("operators", OPERATORS)
 @pytest.mark.parametrize("angle", [3.0, 6.0, -6.0, 15.0, math.degrees(math.atan(0.5))])
-def test_infinite_slope(angle: float) -> None:
+def test_infinite_slope(angle: float, operators: str) -> None:
     """gamma z cos2 b across and gamma z sin b cos b along planes at a depth z."""
-    normal, shear = on_infinite_slope(angle, 0.5)
+    normal, shear = on_infinite_slope(angle, 0.5, operators)
     assert max(normal) < 0.05
     assert max(shear) < 0.02
 
 
-def test_stresses_on_a_slope_converge() -> None:
-    coarse, fine = (on_infinite_slope(6.0, spacing)[0] for spacing in (0.5, 0.25))
+@pytest.mark.parametrize("operators", OPERATORS)
+def test_stresses_on_a_slope_converge(operators: str) -> None:
+    coarse, fine = (on_infinite_slope(6.0, spacing, operators)[0] for spacing in (0.5, 0.25))
     assert max(fine) < 0.6 * max(coarse)
 
 
@@ -91,11 +103,12 @@ def line(corners: list[tuple[float, float]]) -> Line:
     return lambda at: np.interp(at, x, y)
 
 
+@pytest.mark.parametrize("operators", OPERATORS)
 @pytest.mark.parametrize("shape", SHAPES)
-def test_vertical_stress_is_that_of_finite_elements(shape: str) -> None:
+def test_vertical_stress_is_that_of_finite_elements(shape: str, operators: str) -> None:
     corners, top = SHAPES[shape]
     spacing = 0.5
-    simulation = at_rest([*corners, *top[::-1]], spacing)
+    simulation = at_rest([*corners, *top[::-1]], spacing, operators)
     base, surface = line(corners), line(top)
     cells = (90, 24)
     stress = vertical_stress(base, surface, 30.0, cells, unit_weight=UNIT_WEIGHT, nu=K0 / (1.0 + K0))
@@ -111,5 +124,5 @@ def test_vertical_stress_is_that_of_finite_elements(shape: str) -> None:
     exact = (1.0 - part) * by_column[right - 1, nodes] + part * by_column[right, nodes]
     error = np.abs(simulation.field("sigma_v_eff") / exact - 1.0)
     found = largest_by_row(error, (y - base(x)) / spacing, 10)
-    print(f"{shape}: {' '.join(f'{100.0 * one:.1f}' for one in found)} %")
+    print(f"{operators}, {shape}: {' '.join(f'{100.0 * one:.1f}' for one in found)} %")
     assert max(found) < 0.05

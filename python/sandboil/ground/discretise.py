@@ -77,9 +77,9 @@ def discretise(scene: Scene) -> Discretisation:
 
     The bounding box is divided evenly, by the number of cells nearest to scene.spacing, one at least. A cell
     belongs to the region that holds its centre; a centre on a common boundary (within a micrometre) to the
-    region listed first. Above a base that is not level the lowest cell of every column reaches down to it,
-    half a row high to one and a half, and its particle stands in its middle. Raises :class:`InvalidInput` if
-    a region gets no particle.
+    region listed first. Above a base that is not level the three lowest cells of every column are stretched
+    or compressed to reach down to it, and their particles stand in their middle. Raises :class:`InvalidInput`
+    if a region gets no particle.
     """
     lattice = _Lattice.of(scene)
     owner = _owners(scene, lattice)
@@ -154,17 +154,33 @@ def _owners(scene: Scene, lattice: _Lattice) -> NDArray[np.int64]:
     return owner
 
 
+# Rows above a base that is not level which take up its distance from the lattice. With one row cells are half
+# a row to one and a half high, which shortens the time step of ground on a released base by a third.
+_STRETCHED_ROWS = 3
+
+
 def _above_base(scene: Scene, lattice: _Lattice, is_filled: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Middles (n, 2) and heights (n,) of the cells, m, of which the lowest ones reach down to the base."""
+    """Middles (n, 2) and heights (n,) of the cells, m; the lowest ones of a column reach down to the base."""
     centres, height = lattice.centres.copy(), np.full(len(lattice.centres), lattice.dy)
     if scene.outline.base_is_level:
         return centres, height
     filled = is_filled.reshape(lattice.rows, lattice.columns)
     column = np.flatnonzero(filled.any(axis=0))
-    lowest = filled.argmax(axis=0)[column] * lattice.columns + column
-    base = np.interp(centres[lowest, 0], *scene.outline.base.T)
-    height[lowest] = centres[lowest, 1] + 0.5 * lattice.dy - base
-    centres[lowest, 1] = base + 0.5 * height[lowest]
+    lowest = filled.argmax(axis=0)[column]
+    # Rows from the lowest one up to the first gap or the surface.
+    ahead = [
+        filled[np.minimum(lowest + k, lattice.rows - 1), column] & (lowest + k < lattice.rows)
+        for k in range(_STRETCHED_ROWS)
+    ]
+    rows = np.logical_and.accumulate(ahead).sum(axis=0)
+    first = lowest * lattice.columns + column
+    base = np.interp(centres[first, 0], *scene.outline.base.T)
+    top = centres[first, 1] + (rows - 0.5) * lattice.dy
+    share = (top - base) / rows
+    for k in range(_STRETCHED_ROWS):
+        own = k < rows
+        cell = first[own] + k * lattice.columns
+        centres[cell, 1], height[cell] = (base + (k + 0.5) * share)[own], share[own]
     return centres, height
 
 

@@ -92,9 +92,8 @@ MESSAGES: dict[str, Message] = {
     "dual lattice with edges that it does not have": Message(
         NUMERICS,
         "operators",
-        "must be 'conservative' beside free-field sides, on a base that is not level, and with hydraulic "
-        "conditions while the ground moves",
-        "Periodic, Roller and Fixed sides on a level base may have the dual lattice",
+        "must be 'conservative' with hydraulic conditions while the ground moves",
+        "leave the conditions of this stage out with conditions=[], or take operators = 'conservative'",
     ),
     "dual lattice with physics that it does not have": Message(
         NUMERICS,

@@ -37,7 +37,6 @@ use crate::{
         pore_water::PoreWater,
         still_water::StillWater,
     },
-    weights::balance,
 };
 use sandboil_sph::Vec2;
 
@@ -94,8 +93,7 @@ impl<N: Neighbour> Driver<N> {
             SoilField::elastic(model, layout, points)?
         };
         domain.set_present_forces();
-        let response = if domain.ground.geometry.is_balanced { balance::RESPONSE } else { 1.0 };
-        let limit = domain.limit(PressureCoupling::None, response * stage.time_step_factor);
+        let limit = domain.limit(PressureCoupling::None, stage.time_step_factor);
         domain.clock = Clock::start(limit);
         domain.ground.resize_copies(0);
         domain.ground.velocity.fill(Vec2::zeros());

@@ -31,6 +31,7 @@ use crate::{
         still_water::suction_and_pressure,
     },
     weights::{
+        balance,
         geometry::Geometry,
         points::{consistent_gradient, point_weights, stress_node_values},
     },
@@ -157,7 +158,7 @@ impl Domain {
         coupling: PressureCoupling,
         factor: f64,
     ) -> TimeLimit {
-        let Ground { model, points, soil, sharpness, free_surface, .. } = &self.ground;
+        let Ground { model, layout, points, soil, geometry, sharpness, free_surface, .. } = &self.ground;
         let limits = Limits {
             coupling,
             spectrum: &self.spectrum,
@@ -176,8 +177,13 @@ impl Domain {
             .map(|(region, stiffness)| region_limit(model, region, stiffness, &limits))
             .min_by(|a, b| a.dt.total_cmp(&b.dt))
             .unwrap_or_default();
-        let sharper = sharpness.map_or(1.0, |sharpness| sharpness.step_factor);
-        TimeLimit { dt: factor * sharper * dt, criterion }
+        let response = match sharpness {
+            Some(sharpness) => sharpness.step_factor,
+            None if geometry.is_balanced => balance::RESPONSE,
+            None if layout.dual().is_some_and(|dual| dual.is_stretched) => balance::STRETCHED_RESPONSE,
+            None => 1.0,
+        };
+        TimeLimit { dt: factor * response * dt, criterion }
     }
 
     /// The forces of the present state.

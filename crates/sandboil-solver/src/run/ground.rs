@@ -228,8 +228,9 @@ impl Ground {
     /// Moves the corners of cells with the nodes since the last geometry. On base and sides they stay there, in the
     /// components in which these are held.
     pub fn move_corners(&mut self) {
+        let outline = self.outline();
         let Self { layout: StressLayout::Dual(dual), geometry, position, walls, .. } = self else { return };
-        move_corners(dual, geometry, position, *walls);
+        move_corners(dual, geometry, position, EdgesView { outline: &outline, walls: *walls });
     }
 
     /// Updates volumes, densities and masses from the present strain, and restarts the deformation. Returns

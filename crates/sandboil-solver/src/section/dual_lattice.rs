@@ -3,7 +3,10 @@
 //! A corner where cells of several soils meet has one point for each soil, with the part of the volume that the cells of
 //! that soil have. All points of a corner have the same strain and the same pore pressure: they are at one place.
 
-use crate::section::{description::Model, node_id::id, outline::Hand};
+use crate::{
+    section::{description::Model, edge_nodes::EdgeNodes, node_id::id, outline::Hand},
+    weights::balance,
+};
 use sandboil_sph::Vec2;
 use std::collections::BTreeMap;
 
@@ -11,8 +14,8 @@ use std::collections::BTreeMap;
 pub const CORNERS: usize = 4;
 /// Distance from an edge, over the spacing, up to which a corner lies on it: far above rounding.
 const ON_EDGE: f64 = 1e-6;
-/// Least volume of a full corner, over that of a cell. The corner at the foot of a step, with three quarters, has as many
-/// neighbours inside as one in full ground.
+/// Least part of the surroundings of a full corner that is ground. The corner at the foot of a step, with three quarters,
+/// has as many neighbours inside as one in full ground.
 const FULL: f64 = 0.7;
 /// Distance in spacings within which a corner joins a full one.
 const REACH: i64 = 2;
@@ -36,6 +39,8 @@ pub struct DualLattice {
     pub place: Vec<u32>,
     /// The first point at each place.
     pub first: Vec<u32>,
+    /// Whether cells above a base that is not level are stretched to it.
+    pub is_stretched: bool,
     /// Whether each place lies on a free surface.
     pub is_free: Vec<bool>,
     /// Groups of points that share one volume strain; the points of no group are not listed.
@@ -76,39 +81,129 @@ impl OnEdges {
 /// Row and column of a corner on the lattice: that of the cell to its upper right.
 type Corner = (i64, i64);
 
-/// Rows and columns of the lattice.
-struct Lattice {
-    first: Vec2,
-    spacing: Vec2,
-    /// Number of columns between periodic sides.
-    columns: Option<i64>,
+/// Cells of a column between a base that is not level and the first regular row above.
+#[derive(Debug, Clone, Copy)]
+struct Stretched {
+    /// Row of the lowest cell.
+    row: i64,
+    /// Number of these cells, all of one height.
+    cells: i64,
+    /// Their height, m.
+    height: f64,
+    /// Elevation of the base below their middle, m.
+    base: f64,
 }
 
-impl Lattice {
-    fn new(model: &Model) -> Self {
-        let first = model.position.iter().fold(Vec2::repeat(f64::INFINITY), |low, x| low.inf(x));
+/// Rows and columns of the lattice.
+struct Lattice<'a> {
+    model: &'a Model,
+    /// Middle of a regular cell, m.
+    first: Vec2,
+    /// Number of columns between periodic sides.
+    columns: Option<i64>,
+    /// Columns of cells that reach down to a base that is not level.
+    cells: BTreeMap<i64, Stretched>,
+    /// For each column of corners above such a base, the row of the corner on it, and the number of rows from there up to
+    /// the first regular one.
+    corners: BTreeMap<i64, (i64, i64)>,
+}
+
+impl<'a> Lattice<'a> {
+    fn new(model: &'a Model) -> Self {
         let columns = model.period.map(|period| whole(period.width / model.spacing.x));
-        Self { first, spacing: model.spacing, columns }
+        let least = |nodes: &mut dyn Iterator<Item = &Vec2>| {
+            nodes.fold(Vec2::repeat(f64::INFINITY), |low, x| low.inf(x))
+        };
+        let first = least(&mut model.position.iter());
+        let is_regular = |node: &usize| (model.volume[*node] - model.cell()).abs() < ON_EDGE * model.cell();
+        let regular = least(&mut (0..model.nodes()).filter(is_regular).map(|node| &model.position[node]));
+        let lowest = if regular.y.is_finite() { regular.y } else { first.y };
+        let (cells, corners) = (BTreeMap::new(), BTreeMap::new());
+        let mut lattice = Self { model, first: Vec2::new(first.x, lowest), columns, cells, corners };
+        if !balance::is_even(model) {
+            lattice.stretch();
+        }
+        lattice
+    }
+
+    fn column(&self, x: f64) -> i64 {
+        whole((x - self.first.x) / self.model.spacing.x)
+    }
+
+    /// Finds the cells and corners that are off their rows.
+    fn stretch(&mut self) {
+        let Model { spacing, position, volume, outline, .. } = self.model;
+        let mut columns: BTreeMap<i64, Vec<usize>> = BTreeMap::new();
+        for (node, at) in position.iter().enumerate() {
+            columns.entry(self.column(at.x)).or_default().push(node);
+        }
+        for lowest in EdgeNodes::new(self.model).base {
+            let (x, height) = (position[lowest].x, volume[lowest] / spacing.x);
+            let base = outline.base_elevation(x);
+            // The row of the lattice next to the base: above it if the cells are stretched, below it if compressed.
+            let rows = (base - self.first.y) / spacing.y + 0.5;
+            let row = if height > spacing.y { (rows - ON_EDGE).ceil() } else { (rows + ON_EDGE).floor() };
+            let is_alike = |node: &&usize| (volume[**node] / spacing.x - height).abs() < ON_EDGE * spacing.y;
+            let column = self.column(x);
+            let alike = columns[&column].iter().filter(is_alike).count();
+            let is_regular = (height - spacing.y).abs() < ON_EDGE * spacing.y;
+            let cells = if is_regular { 1 } else { i64::try_from(alike).unwrap_or(i64::MAX) };
+            self.cells.insert(column, Stretched { row: whole(row), cells, height, base });
+        }
+        // Between two columns the higher row of the two, so that corners of neighbours meet.
+        for (&column, own) in &self.cells {
+            for beside in [column, column + 1] {
+                let (_, beside) = self.wrapped((0, beside));
+                let (row, top) = (own.row, own.row + own.cells);
+                self.corners
+                    .entry(beside)
+                    .and_modify(|(highest, rows)| {
+                        let lower_top = top.min(*highest + *rows);
+                        *highest = row.max(*highest);
+                        *rows = (lower_top - *highest).max(1);
+                    })
+                    .or_insert((row, own.cells));
+            }
+        }
     }
 
     /// Row and column of a node's cell.
     fn cell(&self, at: Vec2) -> Corner {
-        let place = (at - self.first).component_div(&self.spacing);
-        (whole(place.y), whole(place.x))
+        let column = self.column(at.x);
+        let row = match self.cells.get(&column) {
+            Some(cells) if at.y < cells.base + cells.cells as f64 * cells.height => {
+                cells.row + whole((at.y - cells.base) / cells.height - 0.5)
+            }
+            _ => whole((at.y - self.first.y) / self.model.spacing.y),
+        };
+        (row, column)
     }
 
     fn wrapped(&self, (row, column): Corner) -> Corner {
         (row, self.columns.map_or(column, |columns| column.rem_euclid(columns)))
     }
 
-    /// Corners of a cell, counter-clockwise from the lower left.
+    /// Corners of a cell, counter-clockwise from the lower left. Those below the base are on it: two corners of a cell may
+    /// be one.
     fn corners(&self, (row, column): Corner) -> [Corner; CORNERS] {
-        [(row, column), (row, column + 1), (row + 1, column + 1), (row + 1, column)]
-            .map(|corner| self.wrapped(corner))
+        [(row, column), (row, column + 1), (row + 1, column + 1), (row + 1, column)].map(|corner| {
+            let (row, column) = self.wrapped(corner);
+            (self.corners.get(&column).map_or(row, |&(base, _)| row.max(base)), column)
+        })
     }
 
     fn position(&self, (row, column): Corner) -> Vec2 {
-        self.first + Vec2::new(column as f64 - 0.5, row as f64 - 0.5).component_mul(&self.spacing)
+        let Model { spacing, outline, .. } = self.model;
+        let steps = Vec2::new(column as f64 - 0.5, row as f64 - 0.5);
+        let at = self.first + steps.component_mul(spacing);
+        let Some(&(base, rows)) = self.corners.get(&column) else { return at };
+        let above = row - base;
+        if above >= rows {
+            return at;
+        }
+        let top = at.y + (rows - above) as f64 * spacing.y;
+        let below = outline.base_elevation(at.x);
+        Vec2::new(at.x, below + above as f64 / rows as f64 * (top - below))
     }
 }
 
@@ -124,12 +219,13 @@ impl DualLattice {
         let lattice = Lattice::new(model);
         // Volume and first node of each point.
         let mut points: BTreeMap<(u32, Corner), (f64, u32)> = BTreeMap::new();
+        // Cells that touch each corner.
         let mut corners: BTreeMap<Corner, f64> = BTreeMap::new();
         for (node, (&at, &volume)) in model.position.iter().zip(&model.volume).enumerate() {
             for corner in lattice.corners(lattice.cell(at)) {
                 let quarter = volume / CORNERS as f64;
                 points.entry((model.region[node], corner)).or_insert((0.0, id(node))).0 += quarter;
-                *corners.entry(corner).or_default() += quarter;
+                *corners.entry(corner).or_default() += 1.0;
             }
         }
         let index: BTreeMap<_, _> = points.keys().enumerate().map(|(point, key)| (*key, id(point))).collect();
@@ -146,9 +242,11 @@ impl DualLattice {
             corners.map(|corner| index[&(model.region[node], corner)])
         });
         let on = |corner: &Corner| OnEdges::at(model, lattice.position(*corner));
-        // With the images beyond base and sides.
-        let whole: BTreeMap<Corner, f64> =
-            corners.iter().map(|(corner, volume)| (*corner, on(corner).parts() * volume)).collect();
+        // The part of the surroundings that is ground, with the images beyond base and sides.
+        let whole: BTreeMap<Corner, f64> = corners
+            .iter()
+            .map(|(corner, cells)| (*corner, on(corner).parts() * cells / CORNERS as f64))
+            .collect();
         let mut dual = Self {
             position: points.keys().map(|(_, corner)| lattice.position(*corner)).collect(),
             nodes_at: model.position.clone(),
@@ -158,7 +256,8 @@ impl DualLattice {
             of_node: of_node.collect(),
             place,
             first,
-            is_free: whole.values().map(|volume| *volume < model.cell() * (1.0 - ON_EDGE)).collect(),
+            is_stretched: !lattice.cells.is_empty(),
+            is_free: whole.values().map(|part| *part < 1.0 - ON_EDGE).collect(),
             groups: Vec::new(),
             group: vec![None; points.len()],
         };
@@ -175,7 +274,7 @@ impl DualLattice {
         whole: &BTreeMap<Corner, f64>,
         place_of: &BTreeMap<Corner, u32>,
     ) {
-        let is_full = |corner: &Corner| whole.get(corner).is_some_and(|v| *v >= FULL * model.cell());
+        let is_full = |corner: &Corner| whole.get(corner).is_some_and(|part| *part >= FULL);
         let mut members: BTreeMap<Corner, Vec<Corner>> = BTreeMap::new();
         for corner in whole.keys().filter(|corner| !is_full(corner)) {
             let near = (-REACH..=REACH).flat_map(|up| (-REACH..=REACH).map(move |right| (up, right)));

@@ -4,7 +4,6 @@ use crate::{
     error::SolverError,
     section::description::{AccelerationTerm, Model, Operators},
     stages::stage::{Displacements, Stage, WaterReference},
-    weights::balance,
 };
 
 /// The choices to which the rules apply.
@@ -24,7 +23,6 @@ pub struct Choices {
     /// The acceleration term of Eq. 7, asked for.
     pub acceleration_term: bool,
     /// A base that is not level, or not half a row below the lowest nodes.
-    pub uneven_base: bool,
     /// Periodic sides.
     pub periodic_sides: bool,
     /// A free-field side.
@@ -51,7 +49,6 @@ impl Choices {
             water: model.water.is_some(),
             retention: model.regions.iter().any(|region| region.retention.is_some()),
             acceleration_term: model.numerics.acceleration_term == AccelerationTerm::On,
-            uneven_base: !balance::is_even(model),
             periodic_sides: model.period.is_some(),
             ..Self::default()
         }
@@ -152,8 +149,8 @@ pub const RULES: [Rule; 12] = [
     Rule {
         name: "dual lattice with edges that it does not have",
         choice: "operators",
-        expected: "conservative on an uneven base, and with hydraulic conditions in motion",
-        breaks: |c| c.dual_operators && (c.uneven_base || c.hydraulic_conditions),
+        expected: "conservative with hydraulic conditions in motion",
+        breaks: |c| c.dual_operators && c.hydraulic_conditions,
     },
     Rule {
         name: "dual lattice with physics that it does not have",
@@ -188,7 +185,7 @@ mod tests {
     /// Each rule has its own name, and no single choice breaks a rule, except still water, which needs water.
     #[test]
     fn each_rule_needs_two_choices() {
-        let set: [fn(&mut Choices); 14] = [
+        let set: [fn(&mut Choices); 13] = [
             |c| c.printed_operators = true,
             |c| c.dispersion_correction = true,
             |c| c.water = true,
@@ -202,7 +199,6 @@ mod tests {
             |c| c.dual_operators = true,
             |c| c.retention = true,
             |c| c.acceleration_term = true,
-            |c| c.uneven_base = true,
         ];
         let with = |chosen: &[usize]| {
             let mut choices = Choices::default();

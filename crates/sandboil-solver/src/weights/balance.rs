@@ -11,7 +11,7 @@
 use crate::{
     linear::conjugate_gradients::{Element, Limits, Norm, conjugate_gradients},
     section::{
-        description::{Model, Operators, STRESS_NODES},
+        description::{Model, Operators},
         outline::{Condition, EdgesView, Hand, Outline},
     },
     weights::{rows::VectorWeight, stencils::Stencils},
@@ -27,16 +27,18 @@ const EVEN: f64 = 1e-3;
 /// 30 %); with more, the result is the same.
 const REACH: f64 = 1.5;
 /// Compliance of each multiplier, of uniform stress and of its slopes: a small imbalance remains. Without it
-/// the weights of a few nodes would become so large that they halve the time step. With ten times more on the
-/// slopes, rows above a base of 45 degrees, which hardly resist each other, alternate by a tenth.
-const COMPLIANCE: Moments = [1e-5, 1e-2, 1e-2];
+/// the weights of a few nodes would become so large that they halve the time step.
+const COMPLIANCE: Moments = [1e-6, 3e-3, 3e-3];
 /// Residual over the imbalance at which the iteration for the multipliers ends.
 const TOLERANCE: f64 = 1e-6;
 /// Largest number of iterations; no slope needs more than 350.
 const MOST_ITERATIONS: usize = 5000;
-/// Limit of the time step with balanced weights, over that without: at least 0.71 `h/c_d` on straight bases
-/// and bases with corners, of half a degree to 45 degrees.
-pub const RESPONSE: f64 = 0.7;
+/// Limit of the time step with balanced weights, over that without: at least 0.75 on straight bases and bases with
+/// corners, of half a degree to 45 degrees.
+pub const RESPONSE: f64 = 0.75;
+/// Limit of the time step on the dual lattice above a released base that is not level, over that of a free block: at least
+/// 0.91 of `h/c_d`.
+pub const STRETCHED_RESPONSE: f64 = 0.92;
 /// Moments of a node, dimensionless: of uniform stress, and of stress proportional to x and to y.
 type Moments = [f64; 3];
 /// A node that is brought into balance, or its image, in the stencil of a stress node.
@@ -74,17 +76,18 @@ fn is_level(model: &Model, outline: &Outline) -> bool {
 /// Whether a section needs balanced weights: on a rough held base that is not even.
 pub fn is_needed(model: &Model, EdgesView { outline, walls }: EdgesView) -> bool {
     let is_even = is_level(model, outline);
-    model.numerics.operators == Operators::Conservative && walls.base == Condition::NoSlip && !is_even
+    model.numerics.operators != Operators::Printed && walls.base == Condition::NoSlip && !is_even
 }
 
 /// Changes of the weights that bring stress into balance, by stress node. The neighbours of the stress nodes,
-/// at `points`, are in `list`.
+/// at `points` with `volume_of` (m2), are in `list`.
 pub fn corrections(
     model: &Model,
     outline: &Outline,
     stencils: &Stencils,
     list: &NeighbourList,
     points: &[Vec2],
+    volume_of: impl Fn(usize) -> f64,
 ) -> BTreeMap<usize, Vec<(u32, VectorWeight)>> {
     let slots = slots(model, outline, stencils);
     let nodes: Vec<usize> = (0..model.nodes()).filter(|&node| slots[node].is_some()).collect();
@@ -106,7 +109,7 @@ pub fn corrections(
             continue;
         }
         let Ok(fit) = LeastSquaresFit::new(&members, stencils.kernel) else { continue };
-        let volume = stencils.volume[s / STRESS_NODES] / (STRESS_NODES as f64 * cell);
+        let volume = volume_of(s) / cell;
         let (mut inner, mut parts) = (Vec::new(), Vec::new());
         for (k, m) in members.iter().enumerate() {
             let Some(slot) = slot(m.owner) else { continue };
@@ -262,18 +265,24 @@ fn solve_multipliers(
 mod tests {
     use super::*;
     use crate::{
-        section::outline::{Side, Support, Walls},
+        run::time_step::{DRAINED_COEFFICIENT, DUAL_DRAINED_COEFFICIENT},
+        section::{
+            outline::{Side, Support, Walls},
+            stress_layout::{StressLayout, stress_positions},
+        },
         skeleton::{
             point::StressPoint,
             strain_and_force::{conservative_force, motion},
         },
         testing::square_block,
-        weights::{geometry::Geometry, images::Surroundings, points::stress_node_positions},
+        weights::{geometry::Geometry, images::Surroundings},
     };
     use sandboil_soil::Stress;
 
     const WIDTH: usize = 28;
     const HEIGHT: f64 = 10.0;
+    /// Rows that take up the distance of the base from the lattice, as in scenes.
+    const STRETCHED_ROWS: f64 = 3.0;
 
     /// Ground of unit weight, unit spacing and level surface on a base between smooth sides, with nodes
     /// placed as in scenes.
@@ -292,8 +301,10 @@ mod tests {
         let place = |k: usize| Vec2::new((k % WIDTH) as f64, (k / WIDTH) as f64).add_scalar(0.5);
         let lattice = (0..WIDTH * WIDTH).map(place).filter(|x| x.y < top);
         let nodes = lattice.filter(|x| x.y >= outline.base_elevation(x.x)).map(|x| {
-            let height = x.y + 0.5 - outline.base_elevation(x.x);
-            if height < 1.5 { (Vec2::new(x.x, x.y + 0.5 - 0.5 * height), height) } else { (x, 1.0) }
+            let base = outline.base_elevation(x.x);
+            let top = (base - 0.5).ceil() + STRETCHED_ROWS;
+            let height = (top - base) / STRETCHED_ROWS;
+            if x.y < top { (Vec2::new(x.x, top - (top - x.y) * height), height) } else { (x, 1.0) }
         });
         (model.position, model.volume) = nodes.unzip();
         model.surface_elevation = vec![top; model.nodes()];
@@ -312,7 +323,13 @@ mod tests {
         bases.push(vec![at(0.0, 0.0), at(10.2, 0.0), at(18.2, 8.0), at(end, 8.0)]);
         bases.push(vec![at(0.0, 5.0), at(13.1, 0.0), at(end, 3.0)]);
         bases.push(vec![at(0.0, 0.0), at(6.0, 0.0), at(14.0, 8.0), at(22.0, 0.0), at(end, 0.0)]);
-        bases.iter().map(|base| on_base(base)).collect()
+        let conservative = bases.iter().map(|base| on_base(base));
+        let dual = conservative.clone().map(|mut model| {
+            model.numerics.operators = Operators::Dual;
+            model.numerics.smoothing_ratio = 1.2;
+            model
+        });
+        conservative.chain(dual).collect()
     }
 
     fn build_geometry(model: &Model) -> Geometry {
@@ -321,10 +338,11 @@ mod tests {
 
     /// Points under a stress `(xx, yy)` that depends on the position.
     fn stressed(model: &Model, stress: impl Fn(Vec2) -> [f64; 2]) -> Vec<StressPoint> {
-        let places = stress_node_positions(&model.position, model.spacing);
+        let layout = StressLayout::new(model);
+        let places = layout.positions(&model.position, model.spacing);
         let point = |(s, &at): (usize, &Vec2)| {
             let [xx, yy] = stress(at);
-            let volume = model.volume[s / STRESS_NODES] / STRESS_NODES as f64;
+            let volume = layout.volume(s, &model.volume);
             StressPoint {
                 stress: Stress { xx, yy, ..Stress::default() },
                 volume,
@@ -366,10 +384,10 @@ mod tests {
             let weight = forces(&model, &stressed(&model, |at| [0.5, 1.0].map(|k| k * (at.y - top))));
             let left = weight.iter().map(|force| (force - Vec2::y()).norm()).fold(0.0, f64::max);
             println!(
-                "{:?}: force of a uniform stress {largest:.1e}, error of the weight {left:.3}",
-                model.outline.base[1]
+                "{:?} {:?}: force of a uniform stress {largest:.1e}, error of the weight {left:.3}",
+                model.numerics.operators, model.outline.base[1]
             );
-            assert!(largest < 1e-3 && left < 0.2, "{largest} {left}");
+            assert!(largest < 0.015 && left < 0.12, "{largest} {left}");
         }
     }
 
@@ -383,12 +401,12 @@ mod tests {
             let away = Vec2::new(-along.y, along.x);
             let velocity: Vec<Vec2> =
                 model.position.iter().map(|x| Vec2::new(0.0, 0.3) * (x - from).dot(&away)).collect();
-            let places = stress_node_positions(&model.position, model.spacing);
+            let places = stress_positions(&model);
             // Smooth sides mirror the field: it is linear only in the middle.
             for s in (0..places.len()).filter(|&s| (places[s].x - 0.5 * WIDTH as f64).abs() < 10.0) {
                 let (x, y) = motion(&geometry, s, &velocity).gradient();
                 let error = x.norm() + (y - away * 0.3).norm();
-                assert!(error < 1e-12, "{error}");
+                assert!(error < 1e-11, "{error}");
             }
         }
     }
@@ -439,11 +457,14 @@ mod tests {
             let released = |condition| limit(&model, Walls::shaken(&model.outline, condition, [false; 2]));
             let held = limit(&model, Walls::statics(&model.outline));
             let free = [Condition::VerticalRoller, Condition::Traction].map(released);
-            println!("{:?}: {held:.3} h/c_d, released {free:.3?}", model.outline.base[1]);
-            assert!(
-                held > RESPONSE * 0.99 && free.iter().all(|&limit| limit > 0.95 * 0.99),
-                "{held} {free:?}"
-            );
+            let operators = model.numerics.operators;
+            println!("{operators:?} {:?}: {held:.3} h/c_d, released {free:.3?}", model.outline.base[1]);
+            let (own, released) = match operators {
+                Operators::Dual => (DUAL_DRAINED_COEFFICIENT, STRETCHED_RESPONSE),
+                _ => (DRAINED_COEFFICIENT, 1.0),
+            };
+            let is_stable = free.iter().all(|&limit| limit > own * released);
+            assert!(held > own * RESPONSE && is_stable, "{held} {free:?}");
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::{
     section::{
         dual_lattice::DualLattice,
-        outline::{Condition, Walls},
+        outline::{Condition, EdgesView},
     },
     weights::geometry::Geometry,
 };
@@ -11,7 +11,8 @@ use sandboil_sph::Vec2;
 
 /// Moves the corners with the nodes, which are now at `position` (m), since the geometry was built: by the value at the
 /// corner of a linear fit to the displacements. On base and sides they keep the components that are held there.
-pub fn move_corners(dual: &mut DualLattice, geometry: &Geometry, position: &[Vec2], walls: Walls) {
+pub fn move_corners(dual: &mut DualLattice, geometry: &Geometry, position: &[Vec2], edges: EdgesView) {
+    let EdgesView { outline, walls } = edges;
     for s in 0..dual.position.len() {
         let at = dual.position[s];
         let moved = |j: usize| position[j] - dual.nodes_at[j];
@@ -31,22 +32,23 @@ pub fn move_corners(dual: &mut DualLattice, geometry: &Geometry, position: &[Vec
             displacement = moved(dual.node[s] as usize);
         }
         if dual.on[s].base {
-            displacement.component_mul_assign(&freedom(walls.base, Vec2::y()));
+            let normal = outline.nearest_on_base(at).map_or(Vec2::y(), |(_, normal)| normal);
+            displacement = allowed(walls.base, normal, displacement);
         }
         if let Some(hand) = dual.on[s].side {
-            displacement.component_mul_assign(&freedom(walls.sides[hand as usize], Vec2::x()));
+            displacement = allowed(walls.sides[hand as usize], hand.normal(), displacement);
         }
         dual.position[s] = at + displacement;
     }
     dual.nodes_at.copy_from_slice(position);
 }
 
-/// One for a component in which the ground moves on an edge across `normal`, else zero.
-fn freedom(condition: Condition, normal: Vec2) -> Vec2 {
+/// The part of a displacement (m) that the condition of an edge with this normal allows.
+fn allowed(condition: Condition, normal: Vec2, displacement: Vec2) -> Vec2 {
     match condition {
         Condition::NoSlip => Vec2::zeros(),
-        Condition::FreeSlip => Vec2::repeat(1.0) - normal,
-        Condition::VerticalRoller => Vec2::x(),
-        Condition::Traction => Vec2::repeat(1.0),
+        Condition::FreeSlip => displacement - normal * displacement.dot(&normal),
+        Condition::VerticalRoller => Vec2::new(displacement.x, 0.0),
+        Condition::Traction => displacement,
     }
 }

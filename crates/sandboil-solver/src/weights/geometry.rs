@@ -86,6 +86,7 @@ impl Geometry {
                 &stencils,
                 list,
                 &stress_position,
+                |s| layout.volume(s, volume),
             ))
         } else {
             wall_table

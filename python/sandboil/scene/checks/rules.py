@@ -38,7 +38,6 @@ def choices(scene: Scene, stage: AnyStage) -> _core.Choices:
         water=scene.water is not None,
         retention=any(region.retention is not None for region in scene.regions),
         acceleration_term=scene.numerics.acceleration_term == "on",
-        uneven_base=not scene.outline.base_is_level,
         periodic_sides=scene.is_periodic,
         free_field="free-field" in scene.side_kinds and not is_run_out,
         open_sides=isinstance(stage, RunOut) and bool(stage.open_sides),
