@@ -6,6 +6,9 @@ use sandboil_sph::{Mat2, Period, Vec2};
 
 /// Stress nodes of each velocity node.
 pub const STRESS_NODES: usize = 2;
+/// Tolerance on equal volumes, over that of a cell, and on a level base, over the spacing: far above
+/// round-off and too small to matter.
+const EVEN: f64 = 1e-3;
 /// Distance of a stress node from its velocity node over the particle spacing, along the diagonal (Section 3).
 const STRESS_NODE_DISTANCE: f64 = 1.0 / 3.0;
 /// Hydraulic conductivity by its principal values, m/s.
@@ -189,6 +192,13 @@ pub fn stress_node_offset(spacing: Vec2) -> Vec2 {
 }
 
 impl Model {
+    /// Whether a base is level and half a row below the lowest nodes.
+    pub fn is_even_on(&self, outline: &Outline) -> bool {
+        let cell = self.cell();
+        outline.relief() <= EVEN * self.spacing.y
+            && self.volume.iter().all(|volume| (volume - cell).abs() <= EVEN * cell)
+    }
+
     /// Whether pore water has its pressure at the nodes, and not at the corners of cells.
     pub fn has_nodal_water(&self) -> bool {
         self.water.is_some() && self.numerics.operators != Operators::Dual

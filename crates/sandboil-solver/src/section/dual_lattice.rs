@@ -3,10 +3,7 @@
 //! A corner where cells of several soils meet has one point for each soil, with the part of the volume that the cells of
 //! that soil have. All points of a corner have the same strain and the same pore pressure: they are at one place.
 
-use crate::{
-    section::{description::Model, edge_nodes::EdgeNodes, node_id::id, outline::Hand},
-    weights::balance,
-};
+use crate::section::{description::Model, edge_nodes::EdgeNodes, node_id::id, outline::Hand};
 use sandboil_sph::Vec2;
 use std::collections::BTreeMap;
 
@@ -120,7 +117,7 @@ impl<'a> Lattice<'a> {
         let lowest = if regular.y.is_finite() { regular.y } else { first.y };
         let (cells, corners) = (BTreeMap::new(), BTreeMap::new());
         let mut lattice = Self { model, first: Vec2::new(first.x, lowest), columns, cells, corners };
-        if !balance::is_even(model) {
+        if !model.is_even_on(&model.outline) {
             lattice.stretch();
         }
         lattice

@@ -19,9 +19,6 @@ use crate::{
 use sandboil_sph::{LeastSquaresFit, Mat2, NeighbourList, Vec2, operators::GradientWeight};
 use std::collections::BTreeMap;
 
-/// Tolerance on equal volumes, over that of a cell, and on a level base, over the spacing: far above
-/// round-off and too small to matter.
-const EVEN: f64 = 1e-3;
 /// Distance from the base within which nodes are brought into balance, in kernel supports. With less, the
 /// weights cannot compensate the volumes that the base has changed (at one support, errors of 2 % become
 /// 30 %); with more, the result is the same.
@@ -62,20 +59,9 @@ struct Stencil {
     parts: Vec<Part>,
 }
 
-/// Whether the base of a section is level and half a row below the lowest nodes.
-pub fn is_even(model: &Model) -> bool {
-    is_level(model, &model.outline)
-}
-
-fn is_level(model: &Model, outline: &Outline) -> bool {
-    let cell = model.cell();
-    outline.relief() <= EVEN * model.spacing.y
-        && model.volume.iter().all(|volume| (volume - cell).abs() <= EVEN * cell)
-}
-
 /// Whether a section needs balanced weights: on a rough held base that is not even.
 pub fn is_needed(model: &Model, EdgesView { outline, walls }: EdgesView) -> bool {
-    let is_even = is_level(model, outline);
+    let is_even = model.is_even_on(outline);
     model.numerics.operators != Operators::Printed && walls.base == Condition::NoSlip && !is_even
 }
 

@@ -71,8 +71,10 @@ pub fn dual(mut model: Model) -> Model {
     model
 }
 
-/// Names of the layouts of stress points, and what puts a section on them.
-pub const LAYOUTS: [(&str, fn(Model) -> Model); 2] = [("diagonal", |model| model), ("dual", dual)];
+/// Name of a layout of stress points, and what puts a section on it.
+type Layout = (&'static str, fn(Model) -> Model);
+/// Both layouts.
+pub const LAYOUTS: [Layout; 2] = [("diagonal", |model| model), ("dual", dual)];
 
 /// Linear elastic soil of mixture density 2 Mg/m3 when dry.
 pub fn elastic(shear_modulus: f64, bulk_modulus: f64) -> Region {

@@ -87,54 +87,50 @@ fn recorded(stage: &Shaking, interval: f64) -> Shaking {
 #[test]
 fn a_recorded_column_acts_as_the_computed_one() {
     for (name, layout) in LAYOUTS {
-        recorded_beside_computed(name, layout);
-    }
-}
-
-fn recorded_beside_computed(name: &str, layout: fn(Model) -> Model) {
-    const INTERVAL: f64 = 2.5e-3;
-    let mut region = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
-    region.hydraulic_conductivity = Conductivity::isotropic(1e-3);
-    let model = layout(block(HEIGHT, SPACING, 10, region, Some(WATER)));
-    let stage = on_free_field(shaking(Some(pulse(5.0, 0.1)), 0.5, Vec::new()));
-    let mut solved = at_rest(&model);
-    solved.begin(recorded(&stage, INTERVAL)).unwrap();
-    let mut velocities = Vec::new();
-    while !solved.is_complete() {
-        solved.advance(1, f64::INFINITY).unwrap();
-        velocities.push(solved.velocity());
-    }
-    let records = solved.take_column_records();
-    assert!(records.iter().all(Option::is_some));
-    let mut replayed = at_rest(&model);
-    let short = Shaking { column_records: records.clone(), duration: 1.0, ..stage.clone() };
-    assert!(replayed.begin(short).is_err());
-    let mut replayed = at_rest(&model);
-    replayed.begin(Shaking { column_records: records, ..stage.clone() }).unwrap();
-    let (mut peak, mut apart) = (0.0_f64, 0.0_f64);
-    for then in &velocities {
-        replayed.advance(1, f64::INFINITY).unwrap();
-        for (now, then) in replayed.velocity().iter().zip(then) {
-            peak = peak.max(then[0].abs());
-            apart = apart.max((now[0] - then[0]).hypot(now[1] - then[1]));
+        const INTERVAL: f64 = 2.5e-3;
+        let mut region = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
+        region.hydraulic_conductivity = Conductivity::isotropic(1e-3);
+        let model = layout(block(HEIGHT, SPACING, 10, region, Some(WATER)));
+        let stage = on_free_field(shaking(Some(pulse(5.0, 0.1)), 0.5, Vec::new()));
+        let mut solved = at_rest(&model);
+        solved.begin(recorded(&stage, INTERVAL)).unwrap();
+        let mut velocities = Vec::new();
+        while !solved.is_complete() {
+            solved.advance(1, f64::INFINITY).unwrap();
+            velocities.push(solved.velocity());
         }
+        let records = solved.take_column_records();
+        assert!(records.iter().all(Option::is_some));
+        let mut replayed = at_rest(&model);
+        let short = Shaking { column_records: records.clone(), duration: 1.0, ..stage.clone() };
+        assert!(replayed.begin(short).is_err());
+        let mut replayed = at_rest(&model);
+        replayed.begin(Shaking { column_records: records, ..stage.clone() }).unwrap();
+        let (mut peak, mut apart) = (0.0_f64, 0.0_f64);
+        for then in &velocities {
+            replayed.advance(1, f64::INFINITY).unwrap();
+            for (now, then) in replayed.velocity().iter().zip(then) {
+                peak = peak.max(then[0].abs());
+                apart = apart.max((now[0] - then[0]).hypot(now[1] - then[1]));
+            }
+        }
+        // A second stage reads its own record, and is refused without one.
+        let again = Shaking { base: Base::shaken_by(Some(pulse(5.0, -0.1))), ..stage.clone() };
+        solved.begin(recorded(&again, INTERVAL)).unwrap();
+        solved.advance(u64::MAX, f64::INFINITY).unwrap();
+        let column_records = solved.take_column_records();
+        let mut forgotten = at_rest(&model);
+        forgotten.begin(Shaking { column_records: column_records.clone(), ..stage }).unwrap();
+        assert!(forgotten.begin(again.clone()).is_err());
+        replayed.begin(Shaking { column_records, ..again }).unwrap();
+        replayed.advance(u64::MAX, f64::INFINITY).unwrap();
+        let (then, now) = (solved.velocity(), replayed.velocity());
+        let second = then.iter().zip(&now).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
+        println!("{name}, second stage: {:.3} % of the peak", 100.0 * second / peak);
+        assert!(second < 0.005 * peak, "{second} {peak}");
+        println!("{name}, frames every {INTERVAL} s: {:.3} % of the peak", 100.0 * apart / peak);
+        assert!(apart < 0.005 * peak, "{apart} {peak}");
     }
-    // A second stage reads its own record, and is refused without one.
-    let again = Shaking { base: Base::shaken_by(Some(pulse(5.0, -0.1))), ..stage.clone() };
-    solved.begin(recorded(&again, INTERVAL)).unwrap();
-    solved.advance(u64::MAX, f64::INFINITY).unwrap();
-    let column_records = solved.take_column_records();
-    let mut forgotten = at_rest(&model);
-    forgotten.begin(Shaking { column_records: column_records.clone(), ..stage }).unwrap();
-    assert!(forgotten.begin(again.clone()).is_err());
-    replayed.begin(Shaking { column_records, ..again }).unwrap();
-    replayed.advance(u64::MAX, f64::INFINITY).unwrap();
-    let (then, now) = (solved.velocity(), replayed.velocity());
-    let second = then.iter().zip(&now).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
-    println!("{name}, second stage: {:.3} % of the peak", 100.0 * second / peak);
-    assert!(second < 0.005 * peak, "{second} {peak}");
-    println!("{name}, frames every {INTERVAL} s: {:.3} % of the peak", 100.0 * apart / peak);
-    assert!(apart < 0.005 * peak, "{apart} {peak}");
 }
 
 /// The same shaking in one stage or in two: the forces of the columns are continuous between the stages and
@@ -142,55 +138,52 @@ fn recorded_beside_computed(name: &str, layout: fn(Model) -> Model) {
 #[test]
 fn stages_and_renewals_cause_no_shock() {
     for (name, layout) in LAYOUTS {
-        several_beside_one_stage(name, layout);
-    }
-}
-
-fn several_beside_one_stage(name: &str, layout: fn(Model) -> Model) {
-    const INTERVAL: f64 = 1e-3;
-    let shake = |from: f64| {
-        let velocity = |k: i32| {
-            let t = from + f64::from(k) * INTERVAL;
-            0.5 * t.min(0.1) / 0.1 * (2.0 * std::f64::consts::PI * 4.0 * t).sin()
+        const INTERVAL: f64 = 1e-3;
+        let shake = |from: f64| {
+            let velocity = |k: i32| {
+                let t = from + f64::from(k) * INTERVAL;
+                0.5 * t.min(0.1) / 0.1 * (2.0 * std::f64::consts::PI * 4.0 * t).sin()
+            };
+            UpgoingWave::shear(INTERVAL, (0..1000).map(velocity).collect())
         };
-        UpgoingWave::shear(INTERVAL, (0..1000).map(velocity).collect())
-    };
-    let mut region = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
-    region.hydraulic_conductivity = Conductivity::isotropic(1e-4);
-    let run = |stages: &[(f64, f64)], strain_limit: Option<f64>| {
-        let mut model = layout(block(HEIGHT, 0.5, 8, region.clone(), Some(WATER)));
-        model.numerics.geometry_strain_limit = strain_limit;
-        let mut simulation = at_rest(&model);
-        let mut builds = 0;
-        for &(from, duration) in stages {
-            let stage = on_free_field(shaking(Some(shake(from)), duration, Vec::new()));
-            simulation.begin(stage).unwrap();
-            assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
-            builds += simulation.counters().geometry_builds;
+        let mut region = elastic(SHEAR_MODULUS, 2.0 * SHEAR_MODULUS);
+        region.hydraulic_conductivity = Conductivity::isotropic(1e-4);
+        let run = |stages: &[(f64, f64)], strain_limit: Option<f64>| {
+            let mut model = layout(block(HEIGHT, 0.5, 8, region.clone(), Some(WATER)));
+            model.numerics.geometry_strain_limit = strain_limit;
+            let mut simulation = at_rest(&model);
+            let mut builds = 0;
+            for &(from, duration) in stages {
+                let stage = on_free_field(shaking(Some(shake(from)), duration, Vec::new()));
+                simulation.begin(stage).unwrap();
+                assert!(simulation.advance(u64::MAX, f64::INFINITY).unwrap());
+                builds += simulation.counters().geometry_builds;
+            }
+            (simulation.velocity(), builds)
+        };
+        // Stages end after whole steps.
+        let half = {
+            let mut simulation = at_rest(&layout(block(HEIGHT, 0.5, 8, region.clone(), Some(WATER))));
+            simulation.begin(on_free_field(shaking(None, 1.0, Vec::new()))).unwrap();
+            let (dt, _) = simulation.time_step();
+            dt * (0.25 / dt).round()
+        };
+        let (one, builds) = run(&[(0.0, 2.0 * half)], None);
+        let peak = one.iter().map(|v| v[0].abs()).fold(0.0, f64::max);
+        for (case, stages, limit) in [
+            ("two stages", vec![(0.0, half), (half, half)], None),
+            ("renewals", vec![(0.0, 2.0 * half)], Some(2e-3)),
+        ] {
+            let (other, renewed) = run(&stages, limit);
+            let apart =
+                one.iter().zip(&other).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
+            println!(
+                "{name}, {case}: {:.2} % of {peak:.3} m/s apart, {renewed} geometries",
+                100.0 * apart / peak
+            );
+            assert!(renewed > builds);
+            assert!(apart < 2e-3 * peak, "{apart}");
         }
-        (simulation.velocity(), builds)
-    };
-    // Stages end after whole steps.
-    let half = {
-        let mut simulation = at_rest(&layout(block(HEIGHT, 0.5, 8, region.clone(), Some(WATER))));
-        simulation.begin(on_free_field(shaking(None, 1.0, Vec::new()))).unwrap();
-        let (dt, _) = simulation.time_step();
-        dt * (0.25 / dt).round()
-    };
-    let (one, builds) = run(&[(0.0, 2.0 * half)], None);
-    let peak = one.iter().map(|v| v[0].abs()).fold(0.0, f64::max);
-    for (case, stages, limit) in [
-        ("two stages", vec![(0.0, half), (half, half)], None),
-        ("renewals", vec![(0.0, 2.0 * half)], Some(2e-3)),
-    ] {
-        let (other, renewed) = run(&stages, limit);
-        let apart = one.iter().zip(&other).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
-        println!(
-            "{name}, {case}: {:.2} % of {peak:.3} m/s apart, {renewed} geometries",
-            100.0 * apart / peak
-        );
-        assert!(renewed > builds);
-        assert!(apart < 2e-3 * peak, "{apart}");
     }
 }
 
