@@ -456,7 +456,6 @@ class Choices:
         dual_operators: bool = False,
         dispersion_correction: bool = False,
         water: bool = False,
-        retention: bool = False,
         acceleration_term: bool = False,
         periodic_sides: bool = False,
         free_field: bool = False,

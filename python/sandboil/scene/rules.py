@@ -89,12 +89,6 @@ MESSAGES: dict[str, Message] = {
         "where no surface fixes the pressure",
         "dry ground or Periodic sides may have the printed operators",
     ),
-    "dual lattice with edges that it does not have": Message(
-        NUMERICS,
-        "operators",
-        "must be 'conservative' with hydraulic conditions while the ground moves",
-        "leave the conditions of this stage out with conditions=[], or take operators = 'conservative'",
-    ),
     "dual lattice with physics that it does not have": Message(
         NUMERICS,
         "operators",

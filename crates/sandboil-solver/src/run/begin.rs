@@ -342,12 +342,14 @@ impl Domain {
         outline: &Outline,
     ) -> Result<Option<PoreWater>, SolverError> {
         let section = self.ground.view(outline);
-        let model = section.model;
-        let (Some(mut flow), Some(water)) = (CornerFlow::new(section, scheme), model.water) else {
-            return Ok(None);
-        };
+        let (model, Some(dual)) = (section.model, section.layout.dual()) else { return Ok(None) };
+        let of_before = before.and_then(|before| before.saturation(section.layout));
+        let saturation =
+            |node| of_before.as_ref().map_or_else(|| model.saturation(node), |of_node| of_node(node));
+        let flow = CornerFlow::new(section, scheme, &stage.conditions, saturation)?;
+        let (Some(mut flow), Some(water)) = (flow, model.water) else { return Ok(None) };
         if let Some(before) = before.and_then(PoreWater::corners) {
-            flow.continue_from(before);
+            flow.continue_from(before, dual);
         }
         if let WaterReference::StillWater { line } = &stage.water_reference {
             let still = match line {

@@ -188,7 +188,7 @@ impl Domain {
 
     /// The forces of the present state.
     pub fn nodal_forces(&self) -> NodalForces<'_> {
-        let Ground { geometry, points, phases, mass, water, .. } = &self.ground;
+        let Ground { layout, geometry, points, phases, mass, water, .. } = &self.ground;
         NodalForces {
             geometry,
             points,
@@ -196,6 +196,7 @@ impl Domain {
             phases,
             mass,
             water: water.as_ref(),
+            layout,
             printed: self.workspace.printed.as_ref(),
             rayleigh: self.damping.rayleigh.as_ref(),
             viscosity: self.damping.viscosity.as_ref(),
@@ -306,9 +307,10 @@ impl Domain {
         self.prepare_printed_stress();
         let threaded = self.threaded;
         let Self { ground, forces: constant, damping, inertia, workspace, .. } = self;
-        let Ground { model, velocity, acceleration, geometry, points, phases, mass, water, .. } = ground;
+        let Ground { model, layout, velocity, acceleration, geometry, points, phases, mass, water, .. } =
+            ground;
         let Workspace { shares, water_force, printed, sums, .. } = workspace;
-        let (nodes, is_wet) = (model.nodes(), matches!(water, Some(PoreWater::Nodes(_))));
+        let (nodes, is_wet) = (model.nodes(), water.as_ref().is_some_and(PoreWater::has_nodal_force));
         let forces = NodalForces {
             geometry,
             points,
@@ -316,6 +318,7 @@ impl Domain {
             phases,
             mass,
             water: water.as_ref(),
+            layout,
             printed: printed.as_ref(),
             rayleigh: damping.rayleigh.as_ref(),
             viscosity: damping.viscosity.as_ref(),
@@ -458,13 +461,13 @@ impl Domain {
     /// [`SolverError::Diverged`] if the matrix of implicit diffusion is not finite.
     pub fn update_water(&mut self, dt: f64) -> Result<StressWork, SolverError> {
         let Ground { water, geometry, layout, points, velocity, acceleration, .. } = &mut self.ground;
+        let time = TimeStep { end: self.clock.time + dt, dt };
         let work = match (water, &geometry.flow, layout.dual()) {
             (Some(PoreWater::Nodes(flow)), Some(tables), _) => {
                 let motion = SkeletonMotion { velocity, acceleration };
-                let time = TimeStep { end: self.clock.time + dt, dt };
                 flow.step(self.threaded, tables, points, motion, time).then(StressWork::default)
             }
-            (Some(PoreWater::Corners(flow)), _, Some(dual)) => flow.step(self.threaded, dual, points, dt),
+            (Some(PoreWater::Corners(flow)), _, Some(dual)) => flow.step(self.threaded, dual, points, time),
             _ => return Ok(StressWork::default()),
         };
         self.counters.flow_calls += 1;
@@ -480,7 +483,7 @@ impl Domain {
         let shared = self.workspace.shared.as_mut();
         let Some(shared) = shared else { return };
         shared.carry(self.threaded, dual, points, &mut self.workspace.shares, |s| {
-            flow.map_or(0.0, |flow| flow.at_place(dual.place[s] as usize))
+            flow.map_or(0.0, |flow| flow.neutral(dual, s))
         });
     }
 

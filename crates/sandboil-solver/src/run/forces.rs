@@ -1,6 +1,7 @@
 //! Forces on the velocity nodes: the constant ones by their origin, and those of stress, water and damping.
 
 use crate::{
+    section::stress_layout::StressLayout,
     skeleton::{
         phases::Phases,
         point::StressPoint,
@@ -9,7 +10,7 @@ use crate::{
         strain_and_force::{NodalShare, conservative_force},
         viscosity::Viscosity,
     },
-    water::pore_water::PoreWater,
+    water::{corner_pressure::Pressed, pore_water::PoreWater},
     weights::geometry::Geometry,
 };
 use sandboil_sph::Vec2;
@@ -159,6 +160,8 @@ pub struct NodalForces<'a> {
     pub mass: &'a [f64],
     /// Pore water.
     pub water: Option<&'a PoreWater>,
+    /// Where the stress points are.
+    pub layout: &'a StressLayout,
     /// Stresses of the printed operators.
     pub printed: Option<&'a PrintedStress>,
     /// Rayleigh damping.
@@ -168,12 +171,17 @@ pub struct NodalForces<'a> {
 }
 
 impl NodalForces<'_> {
-    /// Force of the excess pore pressure on node `j` (Eq. 6), kN/m.
+    /// Force of the excess pore pressure on node `j` (Eq. 6), kN/m. That of corners is part of the stress there.
     #[inline]
     pub fn of_water(&self, j: usize) -> Vec2 {
-        // That of corners is part of the stress there.
-        let flow = self.water.and_then(PoreWater::nodes);
-        let (Some(flow), Some(tables)) = (flow, &self.geometry.flow) else { return Vec2::zeros() };
+        let (flow, tables) = match (self.water, &self.geometry.flow, self.layout) {
+            (Some(PoreWater::Nodes(flow)), Some(tables), _) => (flow, tables),
+            (Some(PoreWater::Corners(flow)), _, StressLayout::Dual(dual)) if flow.has_nodal_force() => {
+                let Self { geometry, points, phases, .. } = *self;
+                return flow.force(&Pressed { geometry, dual, points, phases }, j);
+            }
+            _ => return Vec2::zeros(),
+        };
         match &self.geometry.printed {
             None => flow.force(tables, j),
             Some(printed) => {

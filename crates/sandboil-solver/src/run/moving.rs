@@ -13,7 +13,6 @@ use crate::{
         time_step::{PressureCoupling, TimeLimit},
     },
     stages::stage::{Displacements, Stage},
-    water::pore_water::PoreWater,
 };
 
 /// Who sets the time step and renews the geometry.
@@ -124,8 +123,9 @@ impl<N: Neighbour> Moving<N> {
     /// Checks finiteness, stability limit and geometry, every few steps.
     fn check(&mut self, domain: &mut Domain, lead: Lead) -> Result<(), SolverError> {
         self.guard(domain)?;
-        if let Some(flow) = domain.ground.water.as_mut().and_then(PoreWater::nodes_mut) {
-            flow.refresh(&domain.ground.model);
+        let Ground { model, layout, water, .. } = &mut domain.ground;
+        if let Some(water) = water {
+            water.refresh(model, layout);
         }
         let limit = self.limit(domain);
         domain.counters.time_step_changes += u64::from(domain.clock.update(limit));

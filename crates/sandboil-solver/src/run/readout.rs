@@ -89,7 +89,7 @@ impl<N: Neighbour> Driver<N> {
     /// Names of the physical processes that a stage may compute, and whether the present stage computes them.
     pub fn physics(&self) -> Vec<(&'static str, bool)> {
         let Domain { ground, damping, inertia, .. } = &self.domain;
-        let Ground { model, water, soil, sharpness, .. } = ground;
+        let Ground { model, layout, water, soil, sharpness, .. } = ground;
         let stage = self.moving();
         let base = stage.and_then(|stage| stage.stage.compliant_base());
         let is = |test: fn(FlowScheme) -> bool| water.as_ref().is_some_and(|water| test(water.scheme()));
@@ -100,7 +100,7 @@ impl<N: Neighbour> Driver<N> {
             ("water acceleration", is(FlowScheme::has_acceleration_term)),
             (
                 "partial saturation",
-                is_partly_saturated || water.as_ref().is_some_and(|water| water.saturation().is_some()),
+                is_partly_saturated || water.as_ref().is_some_and(|water| water.saturation(layout).is_some()),
             ),
             ("soil state", soil.plastic_points() > 0),
             ("base dashpots", base.is_some()),
@@ -192,7 +192,7 @@ impl<N: Neighbour> Driver<N> {
     /// Degree of saturation; `None` where it cannot change: without retention curves, and before shaking.
     pub fn saturation(&self) -> Option<Vec<f64>> {
         let ground = &self.domain.ground;
-        let saturation = ground.water.as_ref()?.saturation()?;
+        let saturation = ground.water.as_ref()?.saturation(&ground.layout)?;
         Some(ground.in_user_order(saturation))
     }
 

@@ -18,8 +18,6 @@ pub struct Choices {
     pub dispersion_correction: bool,
     /// Pore water.
     pub water: bool,
-    /// Soil that takes up and gives off water, by a retention curve.
-    pub retention: bool,
     /// The acceleration term of Eq. 7, asked for.
     pub acceleration_term: bool,
     /// A base that is not level, or not half a row below the lowest nodes.
@@ -47,7 +45,6 @@ impl Choices {
             dual_operators: model.numerics.operators == Operators::Dual,
             dispersion_correction: model.numerics.dispersion_correction,
             water: model.water.is_some(),
-            retention: model.regions.iter().any(|region| region.retention.is_some()),
             acceleration_term: model.numerics.acceleration_term == AccelerationTerm::On,
             periodic_sides: model.period.is_some(),
             ..Self::default()
@@ -85,7 +82,7 @@ pub struct Rule {
 }
 
 /// All rules, in the order in which they are checked.
-pub const RULES: [Rule; 12] = [
+pub const RULES: [Rule; 11] = [
     Rule {
         name: "dispersion correction with printed operators",
         choice: "dispersion_correction",
@@ -147,16 +144,10 @@ pub const RULES: [Rule; 12] = [
         breaks: |c| c.printed_operators && c.water && c.free_field,
     },
     Rule {
-        name: "dual lattice with edges that it does not have",
-        choice: "operators",
-        expected: "conservative with hydraulic conditions in motion",
-        breaks: |c| c.dual_operators && c.hydraulic_conditions,
-    },
-    Rule {
         name: "dual lattice with physics that it does not have",
         choice: "operators",
-        expected: "conservative with dispersion correction, retention curves and the acceleration term",
-        breaks: |c| c.dual_operators && (c.dispersion_correction || c.retention || c.acceleration_term),
+        expected: "conservative with dispersion correction and the acceleration term",
+        breaks: |c| c.dual_operators && (c.dispersion_correction || c.acceleration_term),
     },
 ];
 
@@ -185,7 +176,7 @@ mod tests {
     /// Each rule has its own name, and no single choice breaks a rule, except still water, which needs water.
     #[test]
     fn each_rule_needs_two_choices() {
-        let set: [fn(&mut Choices); 13] = [
+        let set: [fn(&mut Choices); 12] = [
             |c| c.printed_operators = true,
             |c| c.dispersion_correction = true,
             |c| c.water = true,
@@ -197,7 +188,6 @@ mod tests {
             |c| c.hydraulic_conditions = true,
             |c| c.still_water = true,
             |c| c.dual_operators = true,
-            |c| c.retention = true,
             |c| c.acceleration_term = true,
         ];
         let with = |chosen: &[usize]| {

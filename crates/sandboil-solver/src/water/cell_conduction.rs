@@ -50,11 +50,13 @@ pub fn symbol(spacing: Vec2, wave: Vec2) -> f64 {
         + ALTERNATING * inverse.sum() * sin.x * sin.y)
 }
 
-/// Exchange of water between the places of the corners: inflow of a place per metre of head, m/s.
-pub fn cell_conduction(model: &Model, dual: &DualLattice) -> Csr<f64> {
+/// Exchange of water between the places of the corners: inflow of a place per metre of head, m/s. `relative` is the
+/// conductivity of each cell over that of the saturated soil.
+pub fn cell_conduction(model: &Model, dual: &DualLattice, relative: impl Fn(usize) -> f64) -> Csr<f64> {
     let mut rows = vec![Vec::new(); dual.places()];
     for (node, corners) in dual.of_node.iter().enumerate() {
-        let conductivity = model.regions[model.region[node] as usize].hydraulic_conductivity.tensor();
+        let saturated = model.regions[model.region[node] as usize].hydraulic_conductivity.tensor();
+        let conductivity = saturated * relative(node);
         let mut cell = corners.map(|point| dual.position[point as usize]);
         if let Some(period) = model.period {
             // The right corners of the last column are the left ones of the first.
@@ -132,7 +134,7 @@ mod tests {
         for conductivity in [Conductivity::isotropic(2.0), Conductivity { major: 5.0, minor: 0.5, direction }]
         {
             let (model, dual) = block([conductivity; 2], 0);
-            let table = cell_conduction(&model, &dual);
+            let table = cell_conduction(&model, &dual, |_| 1.0);
             let gradient = Vec2::new(0.7, -0.4);
             let head: Vec<f64> = dual.place_positions().iter().map(|x| gradient.dot(x)).collect();
             let mut energy = 0.0;
@@ -157,7 +159,7 @@ mod tests {
         let soils = [1.0, 1e-3].map(Conductivity::isotropic);
         let (model, _) = block(soils, 3);
         let dual = DualLattice::new(&model);
-        let table = cell_conduction(&model, &dual);
+        let table = cell_conduction(&model, &dual, |_| 1.0);
         let contact = 2.5;
         let across = |x: &Vec2| if x.y < contact { x.y - contact } else { 1e3 * (x.y - contact) };
         let along = |x: &Vec2| x.x;
@@ -182,7 +184,7 @@ mod tests {
         model.period = Some(Period { width: 1.0 });
         let dual = DualLattice::new(&model);
         assert_eq!(dual.places(), SIDE + 1);
-        let table = cell_conduction(&model, &dual);
+        let table = cell_conduction(&model, &dual, |_| 1.0);
         let head: Vec<f64> = dual.place_positions().iter().map(|x| x.y * x.y).collect();
         for place in (0..dual.places()).filter(|&place| !dual.is_free[place]) {
             assert!((inflow(&table, &head, place) - 2.0).abs() < 1e-13);

@@ -91,6 +91,14 @@ impl HydraulicCondition {
         }
     }
 
+    /// Refuses a series that is none.
+    ///
+    /// # Errors
+    /// Times that do not rise, or values that are not finite.
+    pub fn validate(&self) -> Result<(), SolverError> {
+        self.series().map_or(Ok(()), |(name, series)| series.validate(name))
+    }
+
     /// The next moment after `time` at which the condition has a corner, s.
     pub fn next_after(&self, time: f64) -> Option<f64> {
         self.series().and_then(|(_, series)| series.next_after(time))
@@ -223,9 +231,7 @@ impl Cells {
         // Samples to find those of the images' feet.
         let mut samples: Vec<Sample> = Vec::new();
         for (boundary, HydraulicBoundary { line, condition }) in boundaries.iter().enumerate() {
-            if let Some((name, series)) = condition.series() {
-                series.validate(name)?;
-            }
+            condition.validate()?;
             let first = cells.len();
             for pair in line.windows(2) {
                 let along = pair[1] - pair[0];

@@ -3,7 +3,9 @@
 pub mod cell_conduction;
 pub mod conditions;
 pub mod conduction;
+pub mod corner_edges;
 pub mod corner_pressure;
+pub mod corner_wetting;
 pub mod edge_law;
 pub mod moving_edges;
 pub mod partly_saturated;

@@ -1,6 +1,7 @@
 //! Pore water of moving ground: its pressure is computed at the nodes, or at the corners of cells on the dual lattice.
 
 use crate::{
+    section::{description::Model, stress_layout::StressLayout},
     skeleton::section_view::SectionView,
     water::{
         corner_pressure::CornerFlow,
@@ -56,7 +57,7 @@ impl PoreWater {
     pub fn follow(&mut self, section: SectionView, time: f64) {
         match self {
             Self::Nodes(flow) => flow.follow(section, time),
-            Self::Corners(flow) => flow.follow(section),
+            Self::Corners(flow) => flow.follow(section, time),
         }
     }
 
@@ -69,8 +70,31 @@ impl PoreWater {
     }
 
     /// Degree of saturation of a node, if it can change.
-    pub fn saturation(&self) -> Option<impl Fn(usize) -> f64> {
-        self.nodes().and_then(Flow::saturation)
+    pub fn saturation<'a>(&'a self, layout: &'a StressLayout) -> Option<Box<dyn Fn(usize) -> f64 + 'a>> {
+        match (self, layout) {
+            (Self::Nodes(flow), _) => flow.saturation().map(|of_node| Box::new(of_node) as Box<_>),
+            (Self::Corners(flow), StressLayout::Dual(dual)) => {
+                flow.saturation(dual).map(|of_node| Box::new(of_node) as Box<_>)
+            }
+            (Self::Corners(_), StressLayout::Diagonal) => None,
+        }
+    }
+
+    /// Makes new tables of diffusion if conductivities or conditions have changed.
+    pub fn refresh(&mut self, model: &Model, layout: &StressLayout) {
+        match (self, layout) {
+            (Self::Nodes(flow), _) => flow.refresh(model),
+            (Self::Corners(flow), StressLayout::Dual(dual)) => flow.refresh(model, dual),
+            (Self::Corners(_), StressLayout::Diagonal) => {}
+        }
+    }
+
+    /// Whether the water exerts forces on nodes besides its pressure at stress points.
+    pub fn has_nodal_force(&self) -> bool {
+        match self {
+            Self::Nodes(_) => true,
+            Self::Corners(flow) => flow.has_nodal_force(),
+        }
     }
 
     /// How the pressure is advanced.

@@ -72,7 +72,7 @@ pub fn dual(mut model: Model) -> Model {
 }
 
 /// Name of a layout of stress points, and what puts a section on it.
-type Layout = (&'static str, fn(Model) -> Model);
+pub type Layout = (&'static str, fn(Model) -> Model);
 /// Both layouts.
 pub const LAYOUTS: [Layout; 2] = [("diagonal", |model| model), ("dual", dual)];
 

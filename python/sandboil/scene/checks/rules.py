@@ -36,7 +36,6 @@ def choices(scene: Scene, stage: AnyStage) -> _core.Choices:
         dual_operators=scene.numerics.operators == "dual",
         dispersion_correction=scene.numerics.dispersion_correction,
         water=scene.water is not None,
-        retention=any(region.retention is not None for region in scene.regions),
         acceleration_term=scene.numerics.acceleration_term == "on",
         periodic_sides=scene.is_periodic,
         free_field="free-field" in scene.side_kinds and not is_run_out,
