@@ -14,10 +14,8 @@ impl Choices {
     #[pyo3(signature = (
         *,
         printed_operators = false,
-        dual_operators = false,
         dispersion_correction = false,
         water = false,
-        acceleration_term = false,
         periodic_sides = false,
         free_field = false,
         open_sides = false,
@@ -29,10 +27,8 @@ impl Choices {
     #[expect(clippy::too_many_arguments, clippy::fn_params_excessive_bools, reason = "keywords of Python")]
     fn new(
         printed_operators: bool,
-        dual_operators: bool,
         dispersion_correction: bool,
         water: bool,
-        acceleration_term: bool,
         periodic_sides: bool,
         free_field: bool,
         open_sides: bool,
@@ -43,10 +39,8 @@ impl Choices {
     ) -> Self {
         Self(solver::Choices {
             printed_operators,
-            dual_operators,
             dispersion_correction,
             water,
-            acceleration_term,
             periodic_sides,
             free_field,
             open_sides,

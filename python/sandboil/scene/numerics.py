@@ -118,9 +118,7 @@ class Numerics(Model):
         """Refuse choices that exclude each other in any scene."""
         choices = _core.Choices(
             printed_operators=self.operators == "printed",
-            dual_operators=self.operators == "dual",
             dispersion_correction=self.dispersion_correction,
-            acceleration_term=self.acceleration_term == "on",
         )
         for name in _core.broken_rules(choices):
             raise MESSAGES[name].refusal(self._label, self)

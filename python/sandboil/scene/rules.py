@@ -89,10 +89,4 @@ MESSAGES: dict[str, Message] = {
         "where no surface fixes the pressure",
         "dry ground or Periodic sides may have the printed operators",
     ),
-    "dual lattice with physics that it does not have": Message(
-        NUMERICS,
-        "operators",
-        "must be 'conservative' with dispersion_correction, retention curves and acceleration_term = 'on'",
-        "leave these out, or take operators = 'conservative'",
-    ),
 }

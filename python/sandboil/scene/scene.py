@@ -205,7 +205,7 @@ class Scene(Model):
         """Whether the pore water's acceleration enters the flow (numerics.acceleration_term resolved)."""
         largest = max(region.conductivity.major for region in self.regions)
         choice = self.numerics.acceleration_term
-        if self.water is None or largest == 0.0 or choice == "off" or self.numerics.operators == "dual":
+        if self.water is None or largest == 0.0 or choice == "off":
             return False
         return choice == "on" or largest <= _core.ACCELERATION_TERM_CONDUCTIVITY
 

@@ -19,8 +19,9 @@ use crate::{
         time_step::PressureCoupling,
     },
     section::{
-        description::{AccelerationTerm, Diffusion, Model, Operators},
+        description::{AccelerationTerm, Diffusion, Model},
         outline::{Outline, Walls},
+        stress_layout::StressLayout,
     },
     skeleton::{
         contacts::Contacts, inertia::Dispersion, rayleigh::RayleighDamping, soils::SoilField,
@@ -269,7 +270,7 @@ impl Domain {
         acceleration.fill(Vec2::zeros());
         *soil = SoilField::plastic(model, layout, points, None)?;
         self.counters.inadmissible_starts = soil.inadmissible_starts();
-        if let Some(inertia) = &mut self.inertia {
+        if let (Some(inertia), StressLayout::Diagonal) = (&mut self.inertia, &*layout) {
             inertia.contacts = Some(Contacts::new(model, points));
         }
         self.sharpen_contacts();
@@ -408,9 +409,7 @@ impl Domain {
         let acceleration = match numerics.acceleration_term {
             AccelerationTerm::On => true,
             AccelerationTerm::Off => false,
-            AccelerationTerm::Auto => {
-                numerics.operators != Operators::Dual && conductivity <= ACCELERATION_TERM_CONDUCTIVITY
-            }
+            AccelerationTerm::Auto => conductivity <= ACCELERATION_TERM_CONDUCTIVITY,
         };
         match (implicit, acceleration) {
             (true, _) => FlowScheme::Implicit,

@@ -58,7 +58,7 @@ pub struct ActiveDamping {
 pub struct CorrectedInertia {
     /// The correction.
     pub dispersion: Dispersion,
-    /// The contacts, from the stiffness when shaking began.
+    /// The contacts between stress nodes, from the stiffness when shaking began; none on the dual lattice.
     pub contacts: Option<Contacts>,
 }
 
@@ -467,7 +467,9 @@ impl Domain {
                 let motion = SkeletonMotion { velocity, acceleration };
                 flow.step(self.threaded, tables, points, motion, time).then(StressWork::default)
             }
-            (Some(PoreWater::Corners(flow)), _, Some(dual)) => flow.step(self.threaded, dual, points, time),
+            (Some(PoreWater::Corners(flow)), _, Some(dual)) => {
+                flow.step(self.threaded, dual, points, acceleration, time)
+            }
             _ => return Ok(StressWork::default()),
         };
         self.counters.flow_calls += 1;
@@ -529,15 +531,18 @@ impl Domain {
         }
     }
 
-    /// With corrected inertia: adds the kinks at contacts to the gradients, and sets the masses that are
-    /// consistent with the operators beside contacts and edges.
+    /// With corrected inertia: sets the masses that are consistent with the operators beside edges and contacts, and adds
+    /// the kinks at contacts to the gradients.
     pub fn sharpen_contacts(&mut self) {
-        let Some(CorrectedInertia { contacts: Some(contacts), .. }) = &self.inertia else { return };
+        let Some(CorrectedInertia { contacts, .. }) = &self.inertia else { return };
         let outline = self.ground.outline();
-        let Ground { model, position, points, geometry, mass, walls, .. } = &mut self.ground;
-        let value = stress_node_values(model, position, EdgesView { outline: &outline, walls: *walls });
+        let Ground { model, layout, position, points, geometry, mass, walls, .. } = &mut self.ground;
+        let edges = EdgesView { outline: &outline, walls: *walls };
+        let value = stress_node_values(model, layout, position, edges);
         *mass = lumped_masses(&value, points, model.nodes());
-        contacts.sharpen(model, position, points, &value, geometry, mass);
+        if let Some(contacts) = contacts {
+            contacts.sharpen(model, position, points, &value, geometry, mass);
+        }
     }
 
     /// Refuses motion and pore pressure that are no longer finite, and impossible velocities. The soil models

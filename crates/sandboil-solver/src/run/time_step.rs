@@ -17,8 +17,13 @@ pub const DRAINED_COEFFICIENT: f64 = 0.99;
 /// Largest factor of dispersion-corrected inertia on the squared frequency of any wave: the limit becomes
 /// `0.71 h / c_d` (the least value, 0.713, is that of h = 1.4 dx and Poisson's ratio zero).
 pub const CORRECTED_RESPONSE: f64 = (DRAINED_COEFFICIENT / 0.71) * (DRAINED_COEFFICIENT / 0.71);
+/// The same on the dual lattice: `0.58 h / c_d`.
+pub const DUAL_CORRECTED_RESPONSE: f64 =
+    (DUAL_DRAINED_COEFFICIENT / 0.58) * (DUAL_DRAINED_COEFFICIENT / 0.58);
 /// Largest factor of dispersion-corrected inertia on the rates of the velocity filter (2.53 at h = 1.4 dx).
 pub const CORRECTED_FILTER: f64 = 2.55;
+/// The same on the dual lattice, as far as it acts on the fastest waves.
+pub const DUAL_CORRECTED_FILTER: f64 = 9.0;
 /// Limit of the undrained wave over `h / c_u`, with prescribed pressure at the surfaces.
 pub const UNDRAINED_COEFFICIENT: f64 = 1.7;
 /// The same without prescribed pressure: undrained soil.
@@ -252,8 +257,11 @@ struct RegionWaves<'a> {
 
 impl<'a> RegionWaves<'a> {
     fn new(model: &'a Model, region: usize, skeleton_stiffness: f64, limits: &'a Limits) -> Self {
-        let (response, filter_response) =
-            if limits.is_corrected { (CORRECTED_RESPONSE, CORRECTED_FILTER) } else { (1.0, 1.0) };
+        let (response, filter_response) = match (limits.is_corrected, model.numerics.operators) {
+            (false, _) => (1.0, 1.0),
+            (true, Operators::Dual) => (DUAL_CORRECTED_RESPONSE, DUAL_CORRECTED_FILTER),
+            (true, _) => (CORRECTED_RESPONSE, CORRECTED_FILTER),
+        };
         let viscosity = VISCOSITY_RATIO * limits.viscosity;
         Self {
             model,

@@ -350,6 +350,7 @@ mod tests {
         section::{
             description::Water,
             outline::{Condition, EdgesView, Outline, Walls},
+            stress_layout::StressLayout,
         },
         skeleton::{
             inertia::tests::{Block, layered},
@@ -496,7 +497,8 @@ mod tests {
             (0..block.points.len()).map(|s| motion(&block.geometry, s, &velocity).gradient()).collect()
         };
         let once = strained(&block);
-        let value = stress_node_values(&model, &model.position, EdgesView { outline: &model.outline, walls });
+        let edges = EdgesView { outline: &model.outline, walls };
+        let value = stress_node_values(&model, &StressLayout::Diagonal, &model.position, edges);
         let contacts = Contacts::new(&model, &block.points);
         let Block { geometry, points, mass, .. } = &mut block;
         contacts.sharpen(&model, &model.position, points, &value, geometry, mass);

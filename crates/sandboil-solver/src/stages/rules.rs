@@ -2,7 +2,7 @@
 
 use crate::{
     error::SolverError,
-    section::description::{AccelerationTerm, Model, Operators},
+    section::description::{Model, Operators},
     stages::stage::{Displacements, Stage, WaterReference},
 };
 
@@ -12,14 +12,10 @@ use crate::{
 pub struct Choices {
     /// The printed operators.
     pub printed_operators: bool,
-    /// The operators of the dual lattice.
-    pub dual_operators: bool,
     /// Inertia corrected for dispersion.
     pub dispersion_correction: bool,
     /// Pore water.
     pub water: bool,
-    /// The acceleration term of Eq. 7, asked for.
-    pub acceleration_term: bool,
     /// A base that is not level, or not half a row below the lowest nodes.
     /// Periodic sides.
     pub periodic_sides: bool,
@@ -42,10 +38,8 @@ impl Choices {
     pub fn of_model(model: &Model) -> Self {
         Self {
             printed_operators: model.numerics.operators == Operators::Printed,
-            dual_operators: model.numerics.operators == Operators::Dual,
             dispersion_correction: model.numerics.dispersion_correction,
             water: model.water.is_some(),
-            acceleration_term: model.numerics.acceleration_term == AccelerationTerm::On,
             periodic_sides: model.period.is_some(),
             ..Self::default()
         }
@@ -82,7 +76,7 @@ pub struct Rule {
 }
 
 /// All rules, in the order in which they are checked.
-pub const RULES: [Rule; 11] = [
+pub const RULES: [Rule; 10] = [
     Rule {
         name: "dispersion correction with printed operators",
         choice: "dispersion_correction",
@@ -143,12 +137,6 @@ pub const RULES: [Rule; 11] = [
         expected: "conservative in saturated ground beside free-field sides",
         breaks: |c| c.printed_operators && c.water && c.free_field,
     },
-    Rule {
-        name: "dual lattice with physics that it does not have",
-        choice: "operators",
-        expected: "conservative with dispersion correction and the acceleration term",
-        breaks: |c| c.dual_operators && (c.dispersion_correction || c.acceleration_term),
-    },
 ];
 
 /// Rules that the choices break, in the order of the table.
@@ -176,7 +164,7 @@ mod tests {
     /// Each rule has its own name, and no single choice breaks a rule, except still water, which needs water.
     #[test]
     fn each_rule_needs_two_choices() {
-        let set: [fn(&mut Choices); 12] = [
+        let set: [fn(&mut Choices); 10] = [
             |c| c.printed_operators = true,
             |c| c.dispersion_correction = true,
             |c| c.water = true,
@@ -187,8 +175,6 @@ mod tests {
             |c| c.large_displacements = true,
             |c| c.hydraulic_conditions = true,
             |c| c.still_water = true,
-            |c| c.dual_operators = true,
-            |c| c.acceleration_term = true,
         ];
         let with = |chosen: &[usize]| {
             let mut choices = Choices::default();

@@ -13,7 +13,7 @@ use crate::{
     },
     water::conduction::collected,
 };
-use sandboil_sph::{Csr, Vec2};
+use sandboil_sph::{Csr, Mat2, Vec2};
 
 /// Resistance to alternating heads, over that of conduction along the sides of a cell alone: no pair of corners of a square
 /// cell then exchanges water uphill, and explicit steps may be twice as long.
@@ -50,27 +50,32 @@ pub fn symbol(spacing: Vec2, wave: Vec2) -> f64 {
         + ALTERNATING * inverse.sum() * sin.x * sin.y)
 }
 
+/// The cell of a node with its corners where they are; none if it has been turned inside out.
+fn cell(model: &Model, dual: &DualLattice, node: usize) -> Option<Cell> {
+    let mut cell = dual.of_node[node].map(|point| dual.position[point as usize]);
+    if let Some(period) = model.period {
+        // The right corners of the last column are the left ones of the first.
+        for (left, right) in [(0, 1), (3, 2)] {
+            if cell[right].x - cell[left].x < NARROWEST * model.spacing.x {
+                cell[right].x += period.width;
+            }
+        }
+    }
+    (area(&cell) >= LEAST_AREA * model.cell()).then_some(cell)
+}
+
+fn conductivity(model: &Model, node: usize) -> Mat2 {
+    model.regions[model.region[node] as usize].hydraulic_conductivity.tensor()
+}
+
 /// Exchange of water between the places of the corners: inflow of a place per metre of head, m/s. `relative` is the
 /// conductivity of each cell over that of the saturated soil.
 pub fn cell_conduction(model: &Model, dual: &DualLattice, relative: impl Fn(usize) -> f64) -> Csr<f64> {
     let mut rows = vec![Vec::new(); dual.places()];
     for (node, corners) in dual.of_node.iter().enumerate() {
-        let saturated = model.regions[model.region[node] as usize].hydraulic_conductivity.tensor();
-        let conductivity = saturated * relative(node);
-        let mut cell = corners.map(|point| dual.position[point as usize]);
-        if let Some(period) = model.period {
-            // The right corners of the last column are the left ones of the first.
-            for (left, right) in [(0, 1), (3, 2)] {
-                if cell[right].x - cell[left].x < NARROWEST * model.spacing.x {
-                    cell[right].x += period.width;
-                }
-            }
-        }
-        let area = area(&cell);
-        if area < LEAST_AREA * model.cell() {
-            continue;
-        }
-        let gradient = mean_gradient(&cell);
+        let Some(cell) = cell(model, dual, node) else { continue };
+        let (area, gradient) = (area(&cell), mean_gradient(&cell));
+        let conductivity = conductivity(model, node) * relative(node);
         let flux = gradient.map(|g| conductivity * g);
         let alternating = {
             let sign = [1.0, -1.0, 1.0, -1.0];
@@ -93,6 +98,29 @@ pub fn cell_conduction(model: &Model, dual: &DualLattice, relative: impl Fn(usiz
         row.push((id(place), 0.0));
     }
     collected(rows)
+}
+
+/// What the acceleration of the soil in the cell of each node drives into the places of its corners: inflow per
+/// acceleration, m s (last term of Eq. 7).
+pub fn driven_by_acceleration(
+    model: &Model,
+    dual: &DualLattice,
+    relative: impl Fn(usize) -> f64,
+) -> Csr<Vec2> {
+    let mut rows = vec![Vec::new(); dual.places()];
+    for (node, corners) in dual.of_node.iter().enumerate() {
+        let Some(cell) = cell(model, dual, node) else { continue };
+        let mobility = conductivity(model, node) * (relative(node) / model.gravity);
+        for (point, gradient) in corners.iter().zip(mean_gradient(&cell)) {
+            let weight = mobility * gradient * -area(&cell);
+            rows[dual.place[*point as usize] as usize].push((id(node), weight));
+        }
+    }
+    let mut table = Csr::with_capacity(rows.len(), CORNERS * dual.of_node.len());
+    for row in &mut rows {
+        table.push_row(row);
+    }
+    table
 }
 
 #[cfg(test)]
@@ -169,6 +197,23 @@ mod tests {
                 let net = inflow(&table, &head, place);
                 assert!(net.abs() < 1e-12, "{place}: {net}");
             }
+        }
+    }
+
+    /// A linear field of accelerations drives its divergence times the conductivity over gravity into every place inside.
+    #[test]
+    fn linear_accelerations_are_exact() {
+        let anisotropic = Conductivity { major: 5.0, minor: 0.5, direction: Vec2::new(0.6, 0.8) };
+        let (model, _) = block([anisotropic; 2], 0);
+        let dual = DualLattice::new(&model);
+        let table = driven_by_acceleration(&model, &dual, |_| 1.0);
+        let rate = Mat2::new(0.3, -0.7, 0.2, 0.9);
+        let acceleration: Vec<Vec2> =
+            model.position.iter().map(|x| rate * x + Vec2::new(2.0, -1.0)).collect();
+        let expected = (anisotropic.tensor() * rate).trace() / model.gravity;
+        for place in (0..dual.places()).filter(|&place| !dual.is_free[place]) {
+            let found: f64 = table.iter_row(place).map(|(j, w)| w.dot(&acceleration[j])).sum();
+            assert!((found - expected).abs() < 1e-13, "{place}: {found} {expected}");
         }
     }
 

@@ -15,7 +15,7 @@ use crate::{
     },
     skeleton::{phases::Phases, point::StressPoint, section_view::SectionView, soils::StressWork},
     water::{
-        cell_conduction::cell_conduction,
+        cell_conduction::{cell_conduction, driven_by_acceleration},
         corner_edges::{self, CornerEdges},
         corner_wetting::CornerWetting,
         moving_edges::MovingBoundary,
@@ -51,6 +51,8 @@ pub struct CornerFlow {
     is_dry: Vec<bool>,
     /// Inflow of each place per metre of head, m/s; none if undrained.
     exchange: Option<Csr<f64>>,
+    /// Inflow of each place per acceleration of the nodes, m s; none without the acceleration term.
+    driven: Option<Csr<Vec2>>,
     /// Places of each node.
     of_node: Vec<[u32; CORNERS]>,
     scheme: FlowScheme,
@@ -152,6 +154,7 @@ impl CornerFlow {
             is_open,
             is_dry,
             exchange: None,
+            driven: None,
             of_node,
             scheme,
             conditions: None,
@@ -260,7 +263,10 @@ impl CornerFlow {
     /// The table of conduction for the present cells and conductivities.
     fn tabulate(&mut self, model: &Model, dual: &DualLattice) {
         let tabled = self.wetting.as_ref().map(|wetting| wetting.tabled());
-        let exchange = cell_conduction(model, dual, |node| tabled.map_or(1.0, |tabled| tabled[node]));
+        let relative = |node: usize| tabled.map_or(1.0, |tabled| tabled[node]);
+        let exchange = cell_conduction(model, dual, relative);
+        self.driven =
+            self.scheme.has_acceleration_term().then(|| driven_by_acceleration(model, dual, relative));
         if let Some(conditions) = &mut self.conditions {
             let Conditions { edges, brought_at_rest, gained, .. } = conditions.as_mut();
             let now = |(place, then): (usize, &f64)| brought(&exchange, edges.head_at_rest(), place) - then;
@@ -383,7 +389,7 @@ impl CornerFlow {
         force
     }
 
-    /// Advances the excess by a step from the strain of the soil at its end. Returns the work on the water, kJ/m; none when
+    /// Advances the excess by a step from the accelerations of the nodes (m/s2) and the strain of the soil at its end. Returns the work on the water, kJ/m; none when
     /// the implicit matrix cannot be factored.
     #[must_use]
     pub fn step(
@@ -391,6 +397,7 @@ impl CornerFlow {
         threaded: bool,
         dual: &DualLattice,
         points: &[StressPoint],
+        acceleration: &[Vec2],
         time: TimeStep,
     ) -> Option<StressWork> {
         if let Some(conditions) = &mut self.conditions {
@@ -406,7 +413,7 @@ impl CornerFlow {
                 }
             }
             FlowScheme::Explicit | FlowScheme::ExplicitWithAcceleration => {
-                self.diffuse_explicitly(threaded, time.dt);
+                self.diffuse_explicitly(threaded, acceleration, time.dt);
             }
         }
         Some(self.end_step(dual))
@@ -442,8 +449,8 @@ impl CornerFlow {
         self.conditions.as_ref().map_or(0.0, |conditions| conditions.inflow[place])
     }
 
-    /// Forward Euler on what conduction brings.
-    fn diffuse_explicitly(&mut self, threaded: bool, dt: f64) {
+    /// Forward Euler on what conduction and acceleration bring.
+    fn diffuse_explicitly(&mut self, threaded: bool, acceleration: &[Vec2], dt: f64) {
         let mut next = std::mem::take(&mut self.next);
         let Some(exchange) = &self.exchange else { return };
         let scale = self.water.unit_weight.recip();
@@ -455,7 +462,10 @@ impl CornerFlow {
                 if self.is_held[place] {
                     *next = self.prescribed(place);
                 } else {
-                    let rate = scale * brought(exchange, &self.excess, place) + self.inflow(place);
+                    let mut rate = scale * brought(exchange, &self.excess, place) + self.inflow(place);
+                    if let Some(driven) = &self.driven {
+                        rate += driven.iter_row(place).map(|(j, w)| w.dot(&acceleration[j])).sum::<f64>();
+                    }
                     *next += dt * self.response[place] * rate;
                 }
             }
@@ -613,6 +623,7 @@ impl CornerFlow {
             + 3 * self.is_held.len()
             + size_of_val(self.of_node.as_slice())
             + self.exchange.as_ref().map_or(0, Csr::bytes)
+            + self.driven.as_ref().map_or(0, Csr::bytes)
             + self.factors.as_ref().map_or(0, |(_, lu)| lu.bytes())
             + self.conditions.as_deref().map_or(0, of_conditions)
             + self.wetting.as_ref().map_or(0, |wetting| wetting.bytes())

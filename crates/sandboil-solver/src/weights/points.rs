@@ -2,9 +2,10 @@
 
 use crate::{
     section::{
-        description::{Model, STRESS_NODES, stress_node_offset},
+        description::{Model, stress_node_offset},
         node_id::id,
         outline::EdgesView,
+        stress_layout::StressLayout,
     },
     weights::{images::Surroundings, stencils::Stencils},
 };
@@ -55,9 +56,14 @@ pub fn point_weights(model: &Model, position: &[Vec2], points: &[Vec2]) -> Csr<f
 
 /// Value of the linear fit at every stress node, as weights of the nodes that sum to one. Images continue the
 /// ground beyond a held edge: their weights are added to those of their nodes.
-pub fn stress_node_values(model: &Model, position: &[Vec2], edges: EdgesView) -> Csr<f64> {
+pub fn stress_node_values(
+    model: &Model,
+    layout: &StressLayout,
+    position: &[Vec2],
+    edges: EdgesView,
+) -> Csr<f64> {
     let kernel = WendlandQuintic::new(model.smoothing_length());
-    let points = stress_node_positions(position, model.spacing);
+    let points = layout.positions(position, model.spacing);
     let around = Surroundings::new(position, edges.outline, edges.walls, kernel.support());
     let list = NeighbourList::build(&points, &around.sources, kernel.support(), 0.0, model.period);
     let volume = vec![0.0; position.len()];
@@ -69,7 +75,7 @@ pub fn stress_node_values(model: &Model, position: &[Vec2], edges: EdgesView) ->
         let mut row: Vec<_> = match LeastSquaresFit::new(&members, kernel) {
             Ok(fit) => members.iter().enumerate().map(|(k, m)| (m.owner, fit.value_weight(k, m))).collect(),
             // A detached node keeps its mass.
-            Err(_) => vec![(id(s / STRESS_NODES), 1.0)],
+            Err(_) => vec![(id(layout.node(s)), 1.0)],
         };
         table.push_row(&mut row);
     }

@@ -33,10 +33,8 @@ def choices(scene: Scene, stage: AnyStage) -> _core.Choices:
     is_run_out = isinstance(stage, RunOut)
     return _core.Choices(
         printed_operators=scene.numerics.operators == "printed",
-        dual_operators=scene.numerics.operators == "dual",
         dispersion_correction=scene.numerics.dispersion_correction,
         water=scene.water is not None,
-        acceleration_term=scene.numerics.acceleration_term == "on",
         periodic_sides=scene.is_periodic,
         free_field="free-field" in scene.side_kinds and not is_run_out,
         open_sides=isinstance(stage, RunOut) and bool(stage.open_sides),
