@@ -763,9 +763,6 @@ CATALOGUE: dict[str, dict[str, Slip]] = {
             to("stages", [{"kind": "gravity"}]),
             to("numerics", {"operators": "printed"}),
         ),
-        "dual lattice with corrected inertia": level(
-            to("numerics", {"operators": "dual", "dispersion_correction": True})
-        ),
         "geometry renewed at no strain": level(to("numerics", {"geometry_strain_limit": 0.0})),
         "gap memory as text": level(to("numerics", {"gap_memory": "yes"})),
     },

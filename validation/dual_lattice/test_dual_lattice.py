@@ -205,7 +205,7 @@ def test_seepage_in_time_precedes_the_dual_lattice() -> None:
         numerics=DUAL,
     )
     # Seepage flows between nodes in both, with weights of the same smoothing length.
-    beside = {"numerics.operators": "conservative", "numerics.smoothing_ratio": DUAL.smoothing_ratio}
+    beside = {"numerics.operators": "conservative", "numerics.smoothing_ratio": 1.4}
     heads = []
     for case in (scene, scene.changed(**beside)):
         simulation = sb.Simulation(case, threads=1)

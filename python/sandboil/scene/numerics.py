@@ -39,8 +39,7 @@ class Numerics(Model):
     """Numbers of the method. The defaults are for engineering; other values are for studies of the method.
 
     `operators` are "conservative", the paper's "printed" ones, or "dual": one stress point a node at the
-    corners of cells, which does not lock in nearly incompressible ground, for scenes on a level base without
-    free-field sides, retention curves and hydraulic conditions while the ground moves. `smoothing_ratio` is
+    corners of cells, which does not lock in nearly incompressible ground. `smoothing_ratio` is
     h/spacing (default 1.4, and 1.2 on the dual lattice); `velocity_filter` (default 0.2, and 0.5 on the dual
     lattice) and `local_damping` are fractions; `time_step_factor` is
     relative to the measured stability limit; beyond `geometry_strain_limit` the particle lists are

@@ -229,7 +229,7 @@ pub(crate) mod tests {
             let point = |s: usize| {
                 let [shear_modulus, stiffness] = moduli[layout.region(model, s)];
                 let volume = layout.volume(s, &vec![1.0; nodes]);
-                StressPoint { density, volume, shear_modulus, stiffness, ..StressPoint::default() }
+                StressPoint { shear_modulus, stiffness, density, volume, ..StressPoint::default() }
             };
             let points: Vec<StressPoint> = (0..layout.count(nodes)).map(point).collect();
             let value = stress_node_values(model, &layout, &model.position, edges);

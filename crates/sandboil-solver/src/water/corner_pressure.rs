@@ -49,6 +49,8 @@ pub struct CornerFlow {
     is_held: Vec<bool>,
     /// Whether every cell that touches a place holds air that stays.
     is_dry: Vec<bool>,
+    /// Whether the pores of each cell hold air that stays, so that no water passes; empty if none does.
+    closed: Vec<bool>,
     /// Inflow of each place per metre of head, m/s; none if undrained.
     exchange: Option<Csr<f64>>,
     /// Inflow of each place per acceleration of the nodes, m s; none without the acceleration term.
@@ -128,19 +130,28 @@ impl CornerFlow {
         // Ground that flows keeps the water that it has above the water table.
         let is_flowing = section.free_surface.is_some();
         let mut is_permeable = vec![false; dual.places()];
-        let (mut holds_air, mut is_dry) = (is_permeable.clone(), vec![true; dual.places()]);
+        let (mut ends_below_air, mut is_dry) = (is_permeable.clone(), vec![true; dual.places()]);
+        let mut closed = vec![false; of_node.len()];
         for (node, places) in of_node.iter().enumerate() {
             let region = &model.regions[model.region[node] as usize];
-            let is_dry_cell = saturation(node) < 1.0 && (is_flowing || region.retention.is_none());
+            let holds_air = saturation(node) < 1.0;
+            let has_curve = region.retention.is_some();
+            closed[node] = holds_air && (is_flowing || !has_curve);
             for &place in places {
                 is_permeable[place as usize] |= region.hydraulic_conductivity.major > 0.0;
-                holds_air[place as usize] |= is_dry_cell;
-                is_dry[place as usize] &= is_dry_cell;
+                // Suction does not end at a surface.
+                ends_below_air[place as usize] |= holds_air && !has_curve;
+                is_dry[place as usize] &= closed[node];
             }
         }
         let is_open: Vec<bool> = (0..dual.places())
-            .map(|place| is_permeable[place] && (holds_air[place] || dual.is_free[place]))
+            .map(|place| {
+                is_permeable[place] && !is_dry[place] && (ends_below_air[place] || dual.is_free[place])
+            })
             .collect();
+        if !closed.contains(&true) {
+            closed.clear();
+        }
         let zeros = vec![0.0; dual.places()];
         let mut flow = Self {
             water,
@@ -153,6 +164,7 @@ impl CornerFlow {
             is_held: is_open.clone(),
             is_open,
             is_dry,
+            closed,
             exchange: None,
             driven: None,
             of_node,
@@ -178,7 +190,7 @@ impl CornerFlow {
     ) -> Result<(), SolverError> {
         let model = section.model;
         let has_curve = model.regions.iter().any(|region| region.retention.is_some());
-        if self.scheme == FlowScheme::Undrained && !has_curve || conditions.is_empty() && !has_curve {
+        if !has_curve && (self.scheme == FlowScheme::Undrained || conditions.is_empty()) {
             return Ok(());
         }
         // Conditions lie on the edges as they were drawn.
@@ -263,7 +275,10 @@ impl CornerFlow {
     /// The table of conduction for the present cells and conductivities.
     fn tabulate(&mut self, model: &Model, dual: &DualLattice) {
         let tabled = self.wetting.as_ref().map(|wetting| wetting.tabled());
-        let relative = |node: usize| tabled.map_or(1.0, |tabled| tabled[node]);
+        let relative = |node: usize| match (self.closed.get(node), tabled) {
+            (Some(true), _) => 0.0,
+            (_, tabled) => tabled.map_or(1.0, |tabled| tabled[node]),
+        };
         let exchange = cell_conduction(model, dual, relative);
         self.driven =
             self.scheme.has_acceleration_term().then(|| driven_by_acceleration(model, dual, relative));
@@ -621,6 +636,7 @@ impl CornerFlow {
         };
         7 * size_of_val(self.excess.as_slice())
             + 3 * self.is_held.len()
+            + self.closed.len()
             + size_of_val(self.of_node.as_slice())
             + self.exchange.as_ref().map_or(0, Csr::bytes)
             + self.driven.as_ref().map_or(0, Csr::bytes)

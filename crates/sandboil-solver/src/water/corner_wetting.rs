@@ -27,6 +27,8 @@ pub struct CornerWetting {
     pressure_at_rest: Vec<f64>,
     at_rest: Vec<Moisture>,
     present: Vec<Moisture>,
+    /// Saturation of each node at rest.
+    node_at_rest: Vec<f64>,
     /// Volume of each point and of its pores, m2.
     volumes: Vec<[f64; 2]>,
     /// Relative conductivity of each cell in the table.
@@ -54,6 +56,7 @@ impl CornerWetting {
         let mut wetting = Self {
             water,
             present: at_rest.clone(),
+            node_at_rest: (0..model.nodes()).map(|node| model.saturation(node)).collect(),
             volumes: vec![[0.0; 2]; count],
             tabled: Vec::new(),
             factored: Vec::new(),
@@ -131,9 +134,9 @@ impl CornerWetting {
         dual.of_node[node].iter().map(|&s| value(s as usize)).sum::<f64>() / CORNERS as f64
     }
 
-    /// Degree of saturation of a node.
+    /// Degree of saturation of a node: that at rest and what the corners of its cell have gained since.
     pub fn saturation(&self, dual: &DualLattice, node: usize) -> f64 {
-        Self::of_node(dual, node, |s| self.present[s].saturation)
+        (self.node_at_rest[node] + self.gained(dual, node)).clamp(0.0, 1.0)
     }
 
     /// By how much the saturation of a node has grown since rest.
@@ -186,6 +189,7 @@ impl CornerWetting {
         size_of_val(self.curve.as_slice())
             + 2 * size_of_val(self.present.as_slice())
             + size_of_val(self.pressure_at_rest.as_slice())
+            + size_of_val(self.node_at_rest.as_slice())
             + size_of_val(self.volumes.as_slice())
             + size_of_val(self.tabled.as_slice())
             + size_of_val(self.factored.as_slice())

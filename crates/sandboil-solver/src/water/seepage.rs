@@ -13,7 +13,7 @@ use crate::{
         conjugate_gradients::{Limits, Norm, conjugate_gradients},
     },
     section::{
-        description::{Model, STRESS_NODES, Water, positive},
+        description::{Model, Operators, STRESS_NODES, Water, positive},
         node_id::id,
         order::sorted,
         stress_layout::{StressLayout, check_stress},
@@ -27,6 +27,8 @@ use crate::{
 use sandboil_soil::{Moisture, Stress, VanGenuchten};
 use sandboil_sph::Vec2;
 
+/// Smoothing length over the spacing of the exchange between nodes beside the dual lattice.
+const SMOOTHING_RATIO: f64 = 1.4;
 /// Change of head in an iteration at which a step is solved, in spacings: Newton's next would be its square.
 pub const HEAD_TOLERANCE: f64 = 1e-6;
 /// Iterations, inner or outer, after which a step is repeated with a shorter length.
@@ -185,7 +187,11 @@ impl Seepage {
         if found != expected {
             return Err(SolverError::Shape { name: "pore_pressure", found, expected });
         }
-        let (model, order) = sorted(model);
+        let (mut model, order) = sorted(model);
+        if model.numerics.operators == Operators::Dual {
+            // Seepage flows between nodes, for which the ratio of the dual lattice is too small.
+            model.numerics.smoothing_ratio = SMOOTHING_RATIO;
+        }
         let conduction = static_conduction(&model);
         let cells = Cells::new(&model, &model.position, &boundaries, conduction.beyond())?;
         let law = EdgeLaw::new(&model, cells, |boundary| &boundaries[boundary].condition);

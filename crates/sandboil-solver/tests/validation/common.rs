@@ -71,11 +71,6 @@ pub fn dual(mut model: Model) -> Model {
     model
 }
 
-/// Name of a layout of stress points, and what puts a section on it.
-pub type Layout = (&'static str, fn(Model) -> Model);
-/// Both layouts.
-pub const LAYOUTS: [Layout; 2] = [("diagonal", |model| model), ("dual", dual)];
-
 /// Linear elastic soil of mixture density 2 Mg/m3 when dry.
 pub fn elastic(shear_modulus: f64, bulk_modulus: f64) -> Region {
     Region {

@@ -1,7 +1,7 @@
 //! Free-field sides: they stay at rest, move the section as the column moves, and let waves leave.
 
 use crate::{
-    common::{LAYOUTS, column, elastic, shaking},
+    common::{column, dual, elastic, shaking},
     stages::at_rest,
     waves::ricker,
 };
@@ -25,6 +25,11 @@ pub fn block(height: f64, spacing: f64, columns: usize, region: Region, water: O
     model.period = None;
     model
 }
+
+/// Name of a layout of stress points, and what puts a section on it.
+pub type Layout = (&'static str, fn(Model) -> Model);
+/// Both layouts.
+pub const LAYOUTS: [Layout; 2] = [("diagonal", |model| model), ("dual", dual)];
 
 fn pulse(frequency: f64, amplitude: f64) -> UpgoingWave {
     let velocity =

@@ -1,8 +1,8 @@
 //! Reflection of outgoing waves by base and sides.
 
 use crate::{
-    common::{LAYOUTS, elastic, shaking},
-    free_field::block,
+    common::{elastic, shaking},
+    free_field::{LAYOUTS, block},
     waves::{ricker, weightless},
 };
 use sandboil_solver::{Base, BaseSegment, Model, Shaking, Simulation, UpgoingWave, Vertical, Water};

@@ -1,6 +1,9 @@
 //! Hydraulic conditions and partly saturated soil while the ground moves, against closed forms and flow at rest.
 
-use crate::common::{LAYOUTS, Layout, column, elastic, shaking};
+use crate::{
+    common::{column, elastic, shaking},
+    free_field::{LAYOUTS, Layout},
+};
 use sandboil_soil::VanGenuchten;
 use sandboil_solver::{
     Conductivity, Diffusion, HydraulicBoundary, HydraulicCondition, Model, MovingBoundary, Seepage, Series,
