@@ -90,7 +90,7 @@ impl LeastSquaresFit {
     /// its corner, 0 on a line).
     const LEAST_DETERMINANT: f64 = 0.004;
     /// Smallest number of members of a fit: three determine it, the fourth makes it more reliable.
-    pub const FEWEST_MEMBERS: usize = 4;
+    const FEWEST_MEMBERS: usize = 4;
 
     /// Fits the stencil.
     ///

@@ -131,6 +131,12 @@ impl Surroundings {
         (source as usize).checked_sub(self.sources.len() - self.images.len()).map(|k| &self.images[k])
     }
 
+    /// Whether a source is an image beyond a corner of two edges.
+    pub fn is_beyond_corner(&self, source: u32) -> bool {
+        let image = (source as usize).checked_sub(self.sources.len() - self.images.len());
+        image.is_some_and(|k| self.crossings[k][1].is_some())
+    }
+
     /// Owners of all sources: neighbour lists are valid only for the same owners.
     pub fn owners(&self) -> impl Iterator<Item = u32> {
         self.sources.iter().map(|source| source.owner)

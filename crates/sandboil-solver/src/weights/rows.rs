@@ -96,8 +96,8 @@ pub type StrainTables = (Csr<GradientWeight>, Vec<[f64; 3]>, Csr<VectorWeight>);
 
 /// Gradient weights at a stress node: those of the nodes around it without images, the covariance of their
 /// positions, and the changes by images. In a corner of two edges the nodes span the plane only with their images. Where
-/// neighbours do not span it even so, or are fewer than a fit needs, as nodes that have left the ground, there is no row: no
-/// strain and no force from stress.
+/// neighbours do not span it otherwise, as nodes that have left the ground, there is no row: no strain and no force from
+/// stress.
 pub struct StrainRow {
     /// Node and its weight, without images.
     pub free: Vec<(u32, GradientWeight)>,
@@ -111,14 +111,13 @@ impl StrainRow {
     /// Least-squares gradient. Each velocity component is fitted to the nodes and to the images that have it.
     pub fn least_squares(stencils: &Stencils, members: &[Member]) -> Option<Self> {
         let real = real_only(members);
-        if real.len() < LeastSquaresFit::FEWEST_MEMBERS {
-            return None;
-        }
         let (mut free, mut covariance) = (Vec::new(), [0.0; 3]);
         if let Ok(fit) = LeastSquaresFit::new(&real, stencils.kernel) {
             free.extend(real.iter().enumerate().map(|(k, m)| (m.owner, fit.weight(k, m))));
             let c = fit.covariance();
             covariance = [c.m11, c.m12, c.m22];
+        } else if !members.iter().any(|m| stencils.around.is_beyond_corner(m.source)) {
+            return None;
         }
         let mut walls = Vec::new();
         for component in [0, 1] {
