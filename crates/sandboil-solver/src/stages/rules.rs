@@ -16,7 +16,6 @@ pub struct Choices {
     pub dispersion_correction: bool,
     /// Pore water.
     pub water: bool,
-    /// A base that is not level, or not half a row below the lowest nodes.
     /// Periodic sides.
     pub periodic_sides: bool,
     /// A free-field side.

@@ -269,6 +269,8 @@ mod tests {
     const HEIGHT: f64 = 10.0;
     /// Rows that take up the distance of the base from the lattice, as in scenes.
     const STRETCHED_ROWS: f64 = 3.0;
+    /// Slope below which a uniform stress is balanced less well.
+    const GENTLE: f64 = 0.11;
 
     /// Ground of unit weight, unit spacing and level surface on a base between smooth sides, with nodes
     /// placed as in scenes.
@@ -373,7 +375,14 @@ mod tests {
                 "{:?} {:?}: force of a uniform stress {largest:.1e}, error of the weight {left:.3}",
                 model.numerics.operators, model.outline.base[1]
             );
-            assert!(largest < 0.015 && left < 0.12, "{largest} {left}");
+            // On a gentle slope rows end far apart, and few weights can balance what an end leaves.
+            let is_gentle = model.outline.base.len() == 2 && model.outline.relief() < GENTLE * WIDTH as f64;
+            let bound = match (is_gentle, model.numerics.operators) {
+                (false, _) => 1e-3,
+                (true, Operators::Dual) => 0.015,
+                (true, _) => 5e-3,
+            };
+            assert!(largest < bound && left < 0.12, "{largest} {left}");
         }
     }
 
